@@ -653,8 +653,7 @@ def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str,
         scene, said = _chosen(scene, Start(scene) if start is None else start)
     elif scene.chosen_fields:
         choice, sentence = _firm(scene)
-        contact = scene.contact.model_copy(update=choice)
-        scene, said = scene.model_copy(update={"contact": contact}), (sentence,)
+        scene, said = scene.model_copy(update={"contact": scene.contact.choosing(choice)}), (sentence,)
     return _at_rest(scene, said) if scene.contact.resting_start else (scene, said)
 
 

@@ -319,6 +319,9 @@ def penalty_stiffness(question: Question) -> Effect:
     """Penalty stiffness, K of (5)."""
     value = question.scene.contact.stiffness
     active, reason = _valued(question, PENALTY, "stiffness", value, "N/m")
+    if active:
+        reason += {"implicit": ", implicit", "paper": ", explicit (5)"}[question.scene.contact.forces]
+        reason += ": chosen for small sags" if "stiffness" in question.scene.contact.chosen else ""
     ignored = question.ignored("stiffness", PENALTY) if value else ""
     return Effect("penalty_stiffness", active, reason, "nothing would hold a body that rests on another", ignored)
 
@@ -327,6 +330,8 @@ def contact_damping(question: Question) -> Effect:
     """Contact damping, B of (5)."""
     value = question.scene.contact.damping
     active, reason = _valued(question, PENALTY, "damping", value, "N s/m")
+    if active and "damping" in question.scene.contact.chosen:
+        reason += ": chosen so that overlaps fade in 10 ms"
     ignored = question.ignored("damping", PENALTY) if value else ""
     return Effect("contact_damping", active, reason, "resting contacts would swing on their springs", ignored)
 

@@ -112,6 +112,19 @@ class Contact(Part):
         False, description="whether bodies of one tree, not neighbours in it, can touch; default false"
     )
 
+    _chosen: tuple[str, ...] = PrivateAttr(())
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """Fields whose values the toolkit has chosen."""
+        return self._chosen
+
+    def choosing(self, values: Mapping[str, float]) -> Self:
+        """Return a copy with values that the toolkit has chosen."""
+        made = self.model_copy(update=dict(values))
+        made._chosen = tuple(values)
+        return made
+
 
 class Hand(Part):
     """The hand: a force on one body. A constant force is the worst case for stability (paper, section VI).

@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 import re
+import stat
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -39,6 +40,8 @@ _MARK = b"\niapb sha256 "
 _LENGTH = len(_MARK) + 64 + 1  # the mark, 64 hexadecimal digits, a newline
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FORMATS = (FORMAT.encode(), TABLE_FORMAT.encode())
+_KEYED = re.compile(r".+-[0-9a-f]{16}\.h5(\.\w+)?")  # a run key, and what says that a file is no complete run
+_MARK_HEAD = b'"format": "iapb store"'
 _HEAD = 1 << 16  # bytes, among which the attributes of a file are
 _BLOCK = 1 << 20
 # Chunks of about this size: small enough to look at a part, large enough to compress.
@@ -159,12 +162,35 @@ def is_old(path: Path) -> bool:
 
 
 def abandoned(folder: Path) -> list[Path]:
-    """Return the temporary files that killed writers left in a store; they are recognised by their names.
+    """Return the temporary files that killed writers left in a store.
 
-    Files that are still being written are not returned, because they are younger and locked.
+    They are recognised by name and content. Files that are still being written are younger and locked.
     """
     found = sorted(folder.glob(f".*{WRITING}")) if is_store(folder) else []
-    return [path for path in found if is_aside(path) and not path.is_symlink() and is_old(path) and not is_locked(path)]
+    return [path for path in found if is_aside(path) and is_plain(path) and is_old(path) and not is_locked(path)
+            and _is_draft(path)]
+
+
+def is_plain(path: Path) -> bool:
+    """Return whether a path is a regular file with this name alone: no link, pipe or folder."""
+    with suppress(OSError):
+        found = path.lstat()
+        return stat.S_ISREG(found.st_mode) and found.st_nlink == 1
+    return False
+
+
+def _is_draft(path: Path) -> bool:
+    """Return whether a temporary file is empty or begins like a run, table, index or mark of iapb."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    ours = _MARK_HEAD in head if path.name.startswith(f".{MARK_NAME}") else head.startswith(b"{")
+    return not head or _says_so(head) or (".h5" not in path.name and ours)
+
+
+def _says_so(head: bytes) -> bool:
+    """Return whether the head of an HDF5 file has our attributes `format` and `format_version` and one of our names."""
+    named = any(re.search(rb"(?<![ -~])" + name + rb"(?![ -~])", head) for name in _FORMATS)
+    return head.startswith(_HDF5_SIGNATURE) and b"\0format\0" in head and b"\0format_version\0" in head and named
 
 
 def is_aside(path: Path) -> bool:
@@ -173,12 +199,17 @@ def is_aside(path: Path) -> bool:
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether a file is a run or table of iapb, complete or damaged: it has a seal, or its HDF5 head says so."""
+    """Return whether a file is a run or table of iapb, complete or damaged, by what nobody else's file has.
+
+    It ends with a seal or, where damage took the seal, its HDF5 head has our attribute `format` and its name a run key.
+    """
+    if not is_plain(path):
+        return False
     with path.open("rb") as file:
         head = file.read(_HEAD)
         file.seek(max(path.stat().st_size - _LENGTH, 0))
         end = file.read()
-    return end.startswith(_MARK) or (head.startswith(_HDF5_SIGNATURE) and any(name in head for name in _FORMATS))
+    return end.startswith(_MARK) or (_KEYED.fullmatch(path.name) is not None and _says_so(head))
 
 
 def sealed(content: bytes) -> bytes:

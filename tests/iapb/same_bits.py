@@ -27,8 +27,11 @@ GAINS = FourChannel((100.0, 100.0, 0.5), (70.0, 70.0, 0.375))
 
 
 def hashes() -> dict[str, str]:
-    """Return one hash for each scene's run, and one for each kind of impact."""
+    """Return two hashes for each scene's run, as shipped and with implicit contact, and one for each kind of impact."""
     found = {path.stem: _run_hash(load_scene(path)) for path in sorted(SCENES.glob("*.yaml"))}
+    for path in sorted(SCENES.glob("*.yaml")):
+        scene = load_scene(path).with_values({"contact.forces": "implicit"})
+        found[f"implicit {path.stem}"] = _run_hash(scene)
     found["coupled peg"] = _run_hash(load_scene(SCENES / "peg_corner.yaml"), coupling=GAINS)
     found["waveforms"] = _hash([waveform_weights(name, 1e-3) for name in WAVEFORMS])
     found["device"] = _device_hash()

@@ -59,14 +59,14 @@ class RestWork(NamedTuple):
     step: np.ndarray  # (d,) Newton step
     given: np.ndarray  # (d,) M times a vector, or L⁻¹ of one
     energy: np.ndarray  # (1,) ½ v*ᵀ M v* [J]
-    count: np.ndarray  # (2,) int64 trees of the group; solutions that were shortened, since the start
+    counts: np.ndarray  # (2,) int64 trees of the group; solutions that were shortened, since the start
 
 
 def make_rest_work(coordinates: int, contacts: int, rows: int, tree_size: int, trees: int) -> RestWork:
     """Allocate the scratch; `rows`: of each contact, `tree_size`: coordinates of the largest tree."""
     c, d = contacts, coordinates
     whole = {"first": trees, "next": c, "next_tree": trees, "trees": trees, "offset": trees, "contact": c,
-             "envelope": d, "count": 2}
+             "envelope": d, "counts": 2}
     vectors = {"speed": c * rows, "change": c * rows, "p": c * rows, "limit": c, "v": d, "free": d,
                "balance": d, "change_of_v": d, "step": d, "given": d, "energy": 1}
     return RestWork(tree=np.zeros((c, 2), np.int64), rows=np.zeros((c * rows, 2 * tree_size)),
@@ -131,7 +131,7 @@ def place_trees(world, state, group):
             work.envelope[size] = work.offset[t]
             size += 1
         many, t = many + 1, work.next_tree[t]
-    work.count[0], work.energy[0] = many, 0.0
+    work.counts[0], work.energy[0] = many, 0.0
     times_mass(world, state, work.free, work.given)
     for i in range(size):
         work.energy[0] += 0.5 * work.free[i] * work.given[i]
@@ -221,7 +221,7 @@ def along_rows(world, work, count, s, v, out):
 def times_mass(world, state, v, out):
     """out <- M v of local velocities, with Δt D of damped joints."""
     work, mass, damped = state.rest_work, state.mass_matrix, world.switches.joint_damping
-    for h in range(work.count[0]):
+    for h in range(work.counts[0]):
         t = work.trees[h]
         start, at, size = world.tree_start[t], work.offset[t], world.tree_stop[t] - world.tree_start[t]
         for i in range(size):
@@ -304,7 +304,7 @@ def open_balance(world, state, size, count, s, k):
         if work.p[r * s] > 0.0:
             energy += 0.5 * work.p[r * s] * work.p[r * s] / (world.dt * k)
     wrong = 0.0
-    for h in range(work.count[0]):
+    for h in range(work.counts[0]):
         t = work.trees[h]
         start, stop, at = world.tree_start[t], world.tree_stop[t], work.offset[t]
         for i in range(start, stop):  # |L⁻¹ r|² = rᵀ M⁻¹ r
@@ -347,7 +347,7 @@ def newton_matrix(world, state, size, count, s, k):
     for i in range(size):
         for j in range(work.envelope[i], i + 1):
             matrix[i, j] = 0.0
-    for h in range(work.count[0]):
+    for h in range(work.counts[0]):
         t = work.trees[h]
         start, at = world.tree_start[t], work.offset[t]
         for i in range(world.tree_stop[t] - start):
@@ -519,7 +519,7 @@ def guard(world, state, size, count, s, solved):
         if share == 0.0:
             break
     if share < 1.0:
-        work.count[1] += 1
+        work.counts[1] += 1
         for i in range(size):
             work.v[i] *= share
 
@@ -528,7 +528,7 @@ def guard(world, state, size, count, s, solved):
 def give_back(world, state, count, s):
     """Write the group's velocity to v and mean_v, and the forces to the contacts and the generalized forces."""
     work, contacts = state.rest_work, state.contacts
-    for h in range(work.count[0]):
+    for h in range(work.counts[0]):
         t = work.trees[h]
         for k in range(world.tree_start[t], world.tree_stop[t]):
             state.v[k] = state.mean_v[k] = work.v[work.offset[t] + k - world.tree_start[t]]

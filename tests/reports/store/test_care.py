@@ -162,6 +162,11 @@ def strew(folder: Path) -> None:
             (place / name).write_bytes(b"somebody else's")
         with h5py.File(place / "measured.h5", "w") as file:
             file["x"] = np.arange(5.0)
+        with h5py.File(place / "noted-0123456789abcdef.h5", "w") as file:  # speaks of us, and is not ours
+            file.attrs["note"], file.attrs["tool"], file["format"] = "made with: iapb run peg_corner", "iapb run", 1
+        (place / ".noted.h5.77.writing").write_bytes((place / "noted-0123456789abcdef.h5").read_bytes())
+        (place / ".text.h5.77.writing").write_bytes(b"somebody else's")
+        (place / ".twin.h5.77.writing").hardlink_to(place / "noted-0123456789abcdef.h5")
         if place != folder:
             (place / INDEX_NAME).write_text('{"file": "thesis_results.h5"}')
         (place / "link.h5").symlink_to(place / "thesis_results.h5")

@@ -150,10 +150,10 @@ def test_an_unfinished_solution_is_shortened_until_it_makes_no_energy() -> None:
         simulation.step()
     state, world, work = simulation.state, simulation.world, simulation.state.rest_work
     work.v[:3] = 1e3 * (1.0 + np.abs(work.v[:3]))
-    before = int(work.count[1])
+    before = int(work.counts[1])
     guard(world, state, 3, 2, 2, False)
     kinetic = 0.5 * work.v[:3] @ state.mass_matrix @ work.v[:3]
-    assert work.count[1] == before + 1 and kinetic <= work.energy[0] * (1.0 + 1e-9) + springs_now(state, world)
+    assert work.counts[1] == before + 1 and kinetic <= work.energy[0] * (1.0 + 1e-9) + springs_now(state, world)
 
 
 def springs_now(state: Any, world: Any) -> float:
