@@ -90,6 +90,7 @@ def law_of(run: Run) -> Any:
         kind = getattr(import_module(module), name)
         return kind(**_known(kind, run.law_settings))
     law = _law_of_world(run.world)
+    law = law.within(scene_of(run)) if hasattr(law, "within") else law
     if law is None or (law.name, dict(law.settings)) != (run.law, dict(run.law_settings)):
         raise ArgumentError("law", run.law,
                             one_of(run.law, LAWS) + ", or the law of a world; other laws are not stored in the file")

@@ -22,12 +22,14 @@ def check(
     """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then."""
     source, remarks = settled(scene_given(scene, set_))
     law = find_world(world).law
+    law = law.within(source) if hasattr(law, "within") else law
     cautions, (said, refused) = check_scene(source, law), cost_in_words(source, law)
     if refused:
         cautions = (*cautions, Caution("size", source.name, said))
     elif said:
         remarks = (*remarks, f"{source.name} in {world}: {said}")
-    limits = step_limits(Start(source), getattr(law, "integrator", "semi_implicit_euler"))
+    explicit = source.contact.forces == "paper"  # implicit contact has no such limits
+    limits = step_limits(Start(source), getattr(law, "integrator", "semi_implicit_euler")) if explicit else None
     if json_:
         print_json({"scene": source.name, "world": world, "remarks": remarks, "limits": limits, "warnings": cautions})
     else:

@@ -80,7 +80,7 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("PB, RK4",), LineStyle(VERMILION, ">", (4, 1, 1, 1), 1.2)),
     (("PB, stiffened",), LineStyle(VERMILION, "d", (), 1.4)),
     # integrators
-    (("momentum",), LineStyle(BLUE, "o")),
+    (("momentum",), LineStyle(INK, "^")),
     (("semi-implicit Euler",), LineStyle(MUTED, "s")),
     (("midpoint",), LineStyle(AMBER, "^", (5, 1.6))),
     (("Runge-Kutta 4",), LineStyle(GREEN, "D", (1.4, 1.4), filled=False)),

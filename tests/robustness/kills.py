@@ -182,7 +182,7 @@ def _plant(folder: Path, garbage: bytes) -> None:
         (folder / OWN / f"{_STALE}{number}.h5").write_bytes(garbage)
     for number in range(_LEFT if garbage else 0):
         left = folder / OWN / f".{_STALE}{number}.h5.1.writing"
-        left.write_bytes(b"half")
+        left.write_bytes(b"")
         os.utime(left, (0.0, 0.0))
 
 

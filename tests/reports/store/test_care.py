@@ -128,7 +128,7 @@ def test_garbage_is_what_no_present_code_asks_for(filled: Path) -> None:
     run = read_run(first)
     store_run(folder / "old-0000000000000000.h5", run, key="0" * 64, code=OLDER)
     for name in (".y.h5.1.writing", ".young.h5.1.writing"):
-        (folder / name).write_bytes(b"half")
+        (folder / name).write_bytes(b"")
     for path in (first, second):
         write_run(path.with_name(path.name + ".partial"), run)
     aged(folder / ".y.h5.1.writing"), aged(first.with_name(first.name + ".partial"))

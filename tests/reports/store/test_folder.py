@@ -177,7 +177,7 @@ def test_a_killed_writer_leaves_its_last_checkpoint(tmp_path: Path, make_run: Ma
 def test_what_a_killed_writer_left_aside_is_removed_once_it_is_old(tmp_path: Path) -> None:
     old, young, theirs = (tmp_path / name for name in (".a.h5.1.writing", ".b.h5.2.writing", ".c.odt.1.writing"))
     for path in (old, young, theirs):
-        path.write_text("x")
+        path.write_text("")
         os.utime(path, None if path == young else (0, 0))
     RunStore(tmp_path)
     assert old.exists()  # nobody has said that this is a store

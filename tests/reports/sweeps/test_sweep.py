@@ -142,7 +142,7 @@ def test_a_point_that_cannot_be_run_is_told_and_the_others_are_done(study: Study
     wrong = study.model_copy(update={"grid": {"law.integrator": ("midpoint", "euler")}})
     outcome = run_sweep(wrong, SCENE, tmp_path)
     assert [result.status == FAILED for result in outcome.results] == [False] * 3 + [True] * 3
-    assert "one of semi_implicit_euler" in outcome.failed[0].note
+    assert "one of momentum, semi_implicit_euler" in outcome.failed[0].note
 
 
 def test_the_table_has_a_row_for_each_point(undisturbed: SweepOutcome) -> None:
