@@ -678,10 +678,12 @@ def _firm(scene: Scene) -> tuple[dict[str, float], str]:
     if "stiffness" in scene.chosen_fields:
         choice["stiffness"] = min(_two_digits(SPARE_LOAD * load / sag, math.ceil), LARGEST_NUMBER)
     if "damping" in scene.chosen_fields:
-        K = choice.get("stiffness", scene.contact.stiffness)
-        choice["damping"] = min(_two_digits(K * RELAXATION, math.ceil), LARGEST_NUMBER)
+        stiffness = choice.get("stiffness", scene.contact.stiffness)
+        choice["damping"] = min(_two_digits(stiffness * RELAXATION, math.ceil), LARGEST_NUMBER)
     values = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
-    return choice, f"chosen for implicit contact: {values}, so that {load:.3g} N sag by less than {in_metres(sag)}"
+    K = choice.get("stiffness", scene.contact.stiffness)
+    sags = f"; a load of {load:.3g} N sags by {in_metres(load / K)}" if K > 0.0 else ""
+    return choice, f"chosen for implicit contact: {values}{sags}"
 
 
 def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
