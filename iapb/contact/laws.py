@@ -19,7 +19,6 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
-from iapb.scene.mechanism import largest_friction
 
 Floats = NDArray[np.float64]
 
@@ -154,8 +153,8 @@ class ImpulseAugmented(_EngineLaw):
         law = super().within(scene)
         if law.friction_in_impacts is not None:
             return law
-        return replace(law, friction_in_impacts=not law.pushing and scene.contact.forces != "paper"
-                       and largest_friction(scene) > 0.0)
+        chosen = not law.pushing and scene.contact.forces != "paper" and scene.names_friction
+        return replace(law, friction_in_impacts=chosen)
 
     @property
     def name(self) -> str:

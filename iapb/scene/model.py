@@ -319,6 +319,12 @@ class Scene(Part):
         return self.integrator or ("semi_implicit_euler" if plane_of_paper else "momentum")
 
     @property
+    def names_friction(self) -> bool:
+        """Whether the scene gives a coefficient of friction above zero anywhere."""
+        own = [part.friction for part in (*self.bodies, *self.walls, *self.contact.friction_pairs)]
+        return any(value is not None and value > 0.0 for value in (self.contact.friction, *own))
+
+    @property
     def chosen_fields(self) -> tuple[str, ...]:
         """Contact fields that the toolkit chooses, since the scene gives no value for them."""
         fields = AUTO if self.contact.auto else () if self.contact.forces == "paper" else ("stiffness", "damping")

@@ -25,7 +25,6 @@ import numpy as np
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
-from iapb.mechanics.kernels.arrays import MechanismArrays
 from iapb.mechanics.kernels.cholesky import solve_mass
 from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
 from iapb.mechanics.kernels.vectors import (
@@ -40,7 +39,6 @@ from iapb.mechanics.kernels.vectors import (
     transform,
     transform_back,
 )
-from iapb.mechanics.structure import has_velocity_terms, moving_parts, point_inertia, rigid_part
 
 STRAIGHT, RIGID, LINKAGE = range(3)
 # rad in a step: below the first, one turn of second order is exact to rounding; beyond the others, several parts
@@ -61,61 +59,6 @@ class FreeMotion(NamedTuple):
     moments: np.ndarray  # (t, 3) its principal moments [kg m²] about centre or origin, ascending
     turning: bool  # whether any tree is RIGID or a LINKAGE
     linked: bool  # whether any tree is a LINKAGE
-
-
-def make_free_motion(m: MechanismArrays, tree_of_body: np.ndarray) -> FreeMotion:
-    """Return the constants of the free motion of the trees, given as the tree of each body."""
-    count = 1 + int(tree_of_body.max())
-    found = FreeMotion(np.zeros(count, np.int64), np.full(count, -1, np.int64), np.zeros(count, np.int64),
-                       np.zeros((count, 3)), np.zeros((count, 3, 3)), np.ones((count, 3)), False, False)
-    merged, carriers = moving_parts(m), [b for b in range(len(m.kind)) if m.v_count[b] > 0]
-    for t in range(count):
-        bodies = np.flatnonzero(tree_of_body == t).tolist()
-        moving = [b for b in bodies if m.v_count[b] > 0]
-        if not moving:
-            continue
-        root = found.root[t] = moving[0]
-        kind, at = int(m.kind[root]), carriers.index(root)
-        if len(moving) == 1 and rigid_part(m, root) and kind in (FREE_FLYER, SPHERICAL):
-            found.kind[t], center, inertia = RIGID, merged.center_of_mass[at], merged.inertia[at]
-            if kind == FREE_FLYER:
-                found.center[t] = center
-            else:
-                inertia = inertia + merged.mass[at] * point_inertia(center)
-            found.moments[t], found.axes[t] = principal_axes(inertia)
-        elif has_velocity_terms(m, bodies):
-            found.kind[t], carried = LINKAGE, {root}
-            for b in bodies:
-                carried |= {b} if m.parent[b] in carried else set()
-            if kind in (FREE_FLYER, PLANAR, SPHERICAL) and carried.issuperset(moving):
-                found.base[t] = m.v_count[root]
-    return found._replace(turning=bool((found.kind != STRAIGHT).any()), linked=bool((found.kind == LINKAGE).any()))
-
-
-def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the principal moments, ascending, and the axes as columns of a rotation, by Jacobi's method.
-
-    Without LAPACK: the same bits on every processor.
-    """
-    matrix, axes = [[float(x) for x in row] for row in inertia], np.eye(3).tolist()
-    for _ in range(30):
-        i, j = max(((0, 1), (0, 2), (1, 2)), key=lambda at: abs(matrix[at[0]][at[1]]))
-        if abs(matrix[i][j]) <= 1e-17 * (abs(matrix[i][i]) + abs(matrix[j][j])):
-            break
-        ratio = (matrix[j][j] - matrix[i][i]) / (2.0 * matrix[i][j])
-        t = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + sqrt(ratio * ratio + 1.0))
-        c = 1.0 / sqrt(t * t + 1.0)
-        s = t * c
-        for rows in (matrix, axes):
-            for row in rows:
-                row[i], row[j] = c * row[i] - s * row[j], s * row[i] + c * row[j]
-        matrix[i], matrix[j] = ([c * a - s * b for a, b in zip(matrix[i], matrix[j], strict=True)],
-                                [s * a + c * b for a, b in zip(matrix[i], matrix[j], strict=True)])
-    order = sorted(range(3), key=lambda k: matrix[k][k])
-    turned = np.array(axes)[:, order]
-    if float((np.cross(turned[:, 0], turned[:, 1]) * turned[:, 2]).sum()) < 0.0:
-        turned[:, 2] *= -1.0
-    return np.array([matrix[k][k] for k in order]), np.ascontiguousarray(turned)
 
 
 @kernel
