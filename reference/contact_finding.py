@@ -27,6 +27,7 @@ TIE = 1e-14  # share of the size within which separations count as equal; a tilt
 # The engine's conventions for boxes: two edges give the normal only if they overlap by this share less than faces do;
 # edges with a smaller sine between them count as parallel; at most four points of a patch are kept.
 EDGE_SHARE, PARALLEL, MOST_POINTS = 0.05, 1e-6, 4
+FACE_SHARE, FACES_COSINE = 1e-4, 0.9999  # the second box's parallel face must overlap less by this share to decide
 
 
 class Contacts(NamedTuple):
@@ -327,11 +328,14 @@ def _corners(ref, other, sign, margin, ids, values, n):  # type: ignore[no-untyp
 def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  # type: ignore[no-untyped-def]
     """Write contacts of two boxes: by the axis of largest separation among 15, a clipped face or two edges."""
     apart, size = center_a - center_b, half_a.sum() + half_b.sum()
-    face, best, edge_i, edge_j, edge_best = -1, -np.inf, 0, 0, -np.inf
+    face, best, most, edge_i, edge_j, edge_best = -1, -np.inf, -np.inf, 0, 0, -np.inf
     for k in range(6):
         m = A[:, k].copy() if k < 3 else B[:, k - 3].copy()
         separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
-        if separation > best + (TIE * size if face >= 0 else 0.0):
+        most = max(most, separation)
+        parallel = 0 <= face < 3 <= k and abs(np.sum(A[:, face] * m)) > FACES_COSINE
+        lead = FACE_SHARE if parallel else TIE
+        if face < 0 or separation > best + lead * size:
             face, best = k, separation
     for i in range(3):
         for j in range(3):
@@ -342,9 +346,9 @@ def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  #
                 separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
                 if separation > edge_best:
                     edge_i, edge_j, edge_best = i, j, separation
-    if max(best, edge_best) > margin:
+    if max(most, edge_best) > margin:
         return n
-    if edge_best > best + EDGE_SHARE * abs(best) + ROUNDING * size:
+    if edge_best > most + EDGE_SHARE * abs(most) + ROUNDING * size:
         return _two_edges(center_a, A, half_a, edge_i, center_b, B, half_b, edge_j, edge_best, ids, values, n)
     if face < 3:
         return _clipped_face(center_a, A, half_a, face, center_b, B, half_b, -1.0, best, margin, ids, values, n)

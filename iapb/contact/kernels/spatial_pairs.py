@@ -143,6 +143,9 @@ PARALLEL_SINE = 1e-6
 EDGE_SHARE = 0.05
 # They must also overlap less by this share of the boxes' size, the rounding of the separations.
 ROUNDING_SHARE = 1e-12
+# A face of b that is parallel to a's decides only if it overlaps less by this share of the boxes' size: two faces that
+# rest on each other keep one normal, and the same points, while the boxes settle.
+FACE_SHARE, FACES_COSINE = 1e-4, 0.9999
 
 
 @kernel
@@ -157,13 +160,13 @@ def boxes(shapes, a, b, R, p, margin, buffer, count):
     size = half_a[0] + half_a[1] + half_a[2] + half_b[0] + half_b[1] + half_b[2]
     if dot(apart, apart) > (size + margin) * (size + margin):
         return count
-    face, of_a, best = _best_face(apart, A, B, half_a, half_b)
-    if best > margin:
+    face, of_a, best, most = _best_face(apart, A, B, half_a, half_b, FACE_SHARE * size)
+    if most > margin:
         return count
     i, j, edge = _best_edges(apart, A, B, half_a, half_b)
     if edge > margin:
         return count
-    if edge > best + EDGE_SHARE * abs(best) + ROUNDING_SHARE * size:
+    if edge > most + EDGE_SHARE * abs(most) + ROUNDING_SHARE * size:
         return _edges(shapes, a, b, i, j, edge, center_a, center_b, A, B, half_a, half_b, buffer, count)
     if of_a:
         return clip_faces(shapes, a, b, True, face, best, center_a, center_b, A, B, half_a, half_b, margin, buffer,
@@ -179,18 +182,24 @@ def _reach(axes, half, n):
 
 
 @kernel
-def _best_face(apart, A, B, half_a, half_b):
-    """Return the face axis of largest separation, whether it is a's, and the separation. A tie goes to a."""
+def _best_face(apart, A, B, half_a, half_b, bias):
+    """Return the face axis that decides, whether it is a's, its separation, and the largest separation of all faces.
+
+    Along a face of b that is parallel to a's, the separation must exceed that along a's by the bias [m].
+    """
     face, of_a, best = 0, True, -math.inf
     for k in range(3):
         separation = abs(dot(apart, A[k])) - half_a[k] - _reach(B, half_b, A[k])
         if separation > best:
             face, of_a, best = k, True, separation
+    most, first = best, face
     for k in range(3):
         separation = abs(dot(apart, B[k])) - half_b[k] - _reach(A, half_a, B[k])
-        if separation > best:
+        most = max(most, separation)
+        lead = bias if of_a and abs(dot(A[first], B[k])) > FACES_COSINE else 0.0
+        if separation > best + lead:
             face, of_a, best = k, False, separation
-    return face, of_a, best
+    return face, of_a, best, most
 
 
 @kernel
