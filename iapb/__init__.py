@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from iapb.certificate import Certificate as Certificate
-    from iapb.certificate import certify as certify
-    from iapb.certificate import certify_impacts as certify_impacts
-    from iapb.checks import check_scene as check_scene
+    from iapb.advice.certificate import Certificate as Certificate
+    from iapb.advice.certificate import certify as certify
+    from iapb.advice.certificate import certify_impacts as certify_impacts
+    from iapb.advice.checks import check_scene as check_scene
+    from iapb.advice.effects import Effect as Effect
+    from iapb.advice.effects import decide_effects as decide_effects
     from iapb.contact.impact import Impact as Impact
     from iapb.contact.impact import Impacts as Impacts
     from iapb.contact.impact import resolve_impact as resolve_impact
     from iapb.contact.impact import resolve_impacts as resolve_impacts
     from iapb.contact.impact_laws import FrictionalImpact as FrictionalImpact
     from iapb.contact.impact_laws import resolve_frictional_impact as resolve_frictional_impact
-    from iapb.effects import Effect as Effect
-    from iapb.effects import decide_effects as decide_effects
     from iapb.errors import ArgumentError as ArgumentError
     from iapb.errors import IapbError as IapbError
     from iapb.errors import MissingDependencyError as MissingDependencyError
@@ -43,11 +43,11 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
-    "iapb.certificate": ("Certificate", "certify", "certify_impacts"),
-    "iapb.checks": ("check_scene",),
+    "iapb.advice.certificate": ("Certificate", "certify", "certify_impacts"),
+    "iapb.advice.checks": ("check_scene",),
     "iapb.contact.impact": ("Impact", "Impacts", "resolve_impact", "resolve_impacts"),
     "iapb.contact.impact_laws": ("FrictionalImpact", "resolve_frictional_impact"),
-    "iapb.effects": ("Effect", "decide_effects"),
+    "iapb.advice.effects": ("Effect", "decide_effects"),
     "iapb.errors": (
         "ArgumentError",
         "IapbError",

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.advice.distrust import distrust_of
+from iapb.advice.effects import Effect
 from iapb.compiled import address_of, block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
-from iapb.distrust import distrust_of
-from iapb.effects import Effect
 from iapb.haptics.kernels import PLANNED
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.kernels.vectors import load, store

@@ -197,7 +197,7 @@ class Run:
     kernel: str = "compiled"  # or "python"
     stopped: str = ""  # why an incomplete run was stopped; empty for a complete one
     remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene, such as by contact.auto
-    # why the result is not to be trusted (`iapb.distrust`); empty if nothing is wrong
+    # why the result is not to be trusted (`iapb.advice.distrust`); empty if nothing is wrong
     distrust: tuple[str, ...] = field(default_factory=tuple)
 
     def __post_init__(self) -> None:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.checks import settled
+from iapb.advice.checks import settled
+from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, count_pairs, decide_for
 from iapb.compiled import Entry, block, columns
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
@@ -22,7 +23,6 @@ from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import make_push_work
 from iapb.contact.kernels.world import State, Stops, Switches, World
 from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.effects import EFFECT_NAMES, Effect, Facts, active_names, count_pairs, decide_for
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import PLANNED, Port
@@ -60,7 +60,7 @@ class Parts:
     Attributes
     ----------
     mechanism, shapes, pairs, stops, capacity, joint_damping : see `System`
-    own_restitution : (r,), see `World`; pair_counts : see `iapb.effects.Facts`
+    own_restitution : (r,), see `World`; pair_counts : see `iapb.advice.effects.Facts`
     firsts : blocks such as ports and switches, of which twins are used
     """
 

@@ -13,7 +13,7 @@ import typer
 
 from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
-from iapb.certificate import EXPORT_HEAD, exported, exported_run
+from iapb.advice.certificate import EXPORT_HEAD, exported, exported_run
 from iapb.errors import ArgumentError, RunFileError
 from reports.commands.as_json import Json, print_json
 from reports.commands.run import counted

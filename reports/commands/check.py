@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from iapb.checks import Caution, Start, check_scene, settled, step_limits
+from iapb.advice.checks import Caution, Start, check_scene, settled, step_limits
 from iapb.scene import Scene
 from reference.worlds import find_world
 from reports.commands.as_json import Json, print_json

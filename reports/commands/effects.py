@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from iapb import decide_effects
-from iapb.effects import ignored_fields
+from iapb.advice.effects import ignored_fields
 from iapb.errors import ArgumentError
 from reference.worlds import find_world
 from reports.commands.as_json import Json, print_json

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from iapb.checks import check_scene
-from iapb.effects import ignored_fields
+from iapb.advice.checks import check_scene
+from iapb.advice.effects import ignored_fields
 from iapb.errors import RunFileError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names

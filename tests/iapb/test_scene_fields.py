@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from iapb.checks import check_scene
+from iapb.advice.checks import check_scene
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError, IapbError, SceneError
 from iapb.mechanics.integrators import INTEGRATORS

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from iapb import compiled, recording, simulation, system
+from iapb.advice.distrust import distrust_of
 from iapb.contact.laws import RENDERINGS, ImpulseAugmented, Penalty, StepResult
-from iapb.distrust import distrust_of
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.mechanics.integrators import INTEGRATORS

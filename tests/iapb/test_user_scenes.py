@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.checks import check_scene
+from iapb.advice.checks import check_scene
 from iapb.errors import IapbError
 from iapb.run import Run
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene

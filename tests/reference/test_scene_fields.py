@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from iapb.certificate import certify
-from iapb.effects import ignored_fields
+from iapb.advice.certificate import certify
+from iapb.advice.effects import ignored_fields
 from iapb.errors import ArgumentError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate

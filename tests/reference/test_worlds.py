@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iapb.advice.effects import ignored_fields
 from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError, IapbError
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED, simulate

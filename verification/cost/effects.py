@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb import decide_effects, find_scene, load_scene
+from iapb.advice.effects import EFFECT_NAMES
 from iapb.compiled import block
 from iapb.contact.kernels.world import Switches
 from iapb.contact.laws import Penalty
-from iapb.effects import EFFECT_NAMES
 from iapb.errors import IapbError
 from iapb.haptics.coupling import NoCoupling
 from iapb.scene import Scene, scene_names

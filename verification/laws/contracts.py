@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iapb.certificate import relative_gain
+from iapb.advice.certificate import relative_gain
 from verification.impacts import (
     Floats,
     ImpactCase,

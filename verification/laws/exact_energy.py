@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb import resolve_impacts
-from iapb.certificate import judge_gains
+from iapb.advice.certificate import judge_gains
 from iapb.compiled import kernel
 from iapb.contact.kernels.passive import gain
 from iapb.double_double import kinetic_energies

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.effects import ignored_fields
+from iapb.advice.effects import ignored_fields
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.names import one_of

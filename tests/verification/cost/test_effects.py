@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iapb import find_scene, load_scene
-from iapb.effects import EFFECTS
+from iapb.advice.effects import EFFECTS
 from iapb.scene import Scene, SpatialScene, scene_from_text, scene_names
 from reference.worlds import find_world
 from verification.clock import Times

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iapb import resolve_impact
-from iapb.certificate import judge_gains
+from iapb.advice.certificate import judge_gains
 from reports.evidence.exact_energy import verdict_of_families
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.laws.exact_energy import FAMILIES, SCALED, Impacts, exact_energy, resolved

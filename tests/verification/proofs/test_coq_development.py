@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iapb.certificate import EXPORT_HEAD, exported, judge_gains
+from iapb.advice.certificate import EXPORT_HEAD, exported, judge_gains
 from iapb.errors import IapbError
 from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED
 from verification.proofs import coq_development, on_proofs

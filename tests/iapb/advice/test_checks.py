@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.checks import Start, check_scene, settled, step_limits
+from iapb.advice.checks import Start, check_scene, settled, step_limits
+from iapb.advice.distrust import distrust_of
 from iapb.contact.laws import ImpulseAugmented
-from iapb.distrust import distrust_of
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_from_text, scene_names
 from iapb.simulation import simulate
 

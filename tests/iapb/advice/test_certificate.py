@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import iapb.certificate
+import iapb.advice.certificate
 from iapb import (
     ArgumentError,
     IapbError,
@@ -22,7 +22,7 @@ from iapb import (
     load_scene,
     simulate,
 )
-from iapb.certificate import exact_gain, judge_gains
+from iapb.advice.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
 from iapb.scene.reading import scene_from_text
@@ -95,7 +95,7 @@ def test_gains_below_any_bound_are_left_to_integers() -> None:
 def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(masses: np.ndarray, before: np.ndarray, after: np.ndarray, signs: np.ndarray) -> None:
         signs[:] = 1
-    monkeypatch.setattr(iapb.certificate, "gain_signs", wrong)
+    monkeypatch.setattr(iapb.advice.certificate, "gain_signs", wrong)
     with pytest.raises(IapbError, match="outside its double-double bounds"):
         judge_gains(np.eye(2), [[1.0, 1.0]], [[0.5, 0.5]])
 
@@ -235,7 +235,7 @@ def test_digest_is_of_m_made_again_which_in_the_engine_has_the_bits_of_the_step(
         if step in run.impacts.step:
             inside.append(digests(simulation.state.mass_matrix[None])[0])
     assert inside == run.impacts.mass_digest.tolist() and len(set(inside)) > 1
-    notation = (Path(__file__).parents[2] / "docs/notation.md").read_text(encoding="utf-8")
+    notation = (Path(__file__).parents[3] / "docs/notation.md").read_text(encoding="utf-8")
     (said,) = (line for line in notation.splitlines() if "`mass_digest`" in line)
     assert "M made again from the recorded q after the run" in said
     assert "not of the M inside the step" in str(certify.__doc__)

@@ -6,7 +6,7 @@ b = B Δt/m. A step of the law's integrator maps (gap, velocity) linearly. The o
 eigenvalue of modulus above 1; for semi-implicit Euler this means k + 2 b > 4. Contacts that share a body oscillate
 together: 1/m is then the largest eigenvalue of J M⁻¹ Jᵀ over all of them. A new contact can start at a depth of up to
 v Δt, and its spring then returns up to k times the kinetic energy of the approach, so k must not exceed 1 either.
-`contact.auto` chooses values well below both limits. `iapb.distrust` checks the run itself.
+`contact.auto` chooses values well below both limits. `iapb.advice.distrust` checks the run itself.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.checks import settled
+from iapb.advice.checks import settled
 from iapb.contact.geometry import Shapes
 from iapb.contact.laws import (
     CLUSTERS,

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iapb.advice.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
 from iapb.compiled import block
 from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented, Penalty
-from iapb.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.simulation import Simulation

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.distrust import distrust_of
+from iapb.advice.distrust import distrust_of
 from iapb.run import Run
 from iapb.scene import Scene, SpatialScene
 from iapb.simulation import simulate
