@@ -114,7 +114,7 @@ def _gather(world, state):
         first = moving_tree(contacts.body_a[i], world.tree_of_body, world.tree_start, world.tree_stop)
         other = moving_tree(contacts.body_b[i], world.tree_of_body, world.tree_start, world.tree_stop)
         f.tree[count, 0], f.tree[count, 1] = first, -1 if other == first else other
-        before = _before(state, i, begin)
+        before = contact_before(state, i, begin)
         n, held, square = load(contacts.normal, i), (0.0, 0.0, 0.0), 0.0
         if before >= 0:
             begin, held = before + 1, scale(world.dt, load(state.previous.friction_force, before))
@@ -132,7 +132,7 @@ def _gather(world, state):
 
 
 @kernel
-def _before(state, i, begin):
+def contact_before(state, i, begin):
     """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
     now, before, total = state.contacts, state.previous, state.contact_count[1]
     for k in range(total):

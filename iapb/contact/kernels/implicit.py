@@ -23,6 +23,7 @@ import numpy as np
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import group_of_contact, moving_tree
+from iapb.contact.kernels.coulomb import contact_before
 from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
 from iapb.mechanics.kernels.vectors import add, load, scale, store
 
@@ -159,7 +160,7 @@ def gather_contacts(world, state, group, s):
             write_row(world, state, count, count * s + j, i, n if j == 0 else tangent_of(n, j - 1, s - 1))
         work.limit[count] = 0.0
         if s > 1:
-            before = same_contact_before(state, i, begin)
+            before = contact_before(state, i, begin)
             if before >= 0:
                 begin = before + 1
                 work.limit[count] = (friction_of(world, contacts, i) * state.previous.normal_force[before]
@@ -167,18 +168,6 @@ def gather_contacts(world, state, group, s):
         count += 1
         i = work.next[i]
     return count
-
-
-@kernel
-def same_contact_before(state, i, begin):
-    """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
-    now, before, total = state.contacts, state.previous, state.contact_count[1]
-    for k in range(total):
-        j = begin + k if begin + k < total else begin + k - total
-        if (now.shape_a[i] == before.shape_a[j] and now.shape_b[i] == before.shape_b[j]
-                and now.feature[i] == before.feature[j]):
-            return j
-    return -1
 
 
 @kernel
@@ -374,33 +363,33 @@ def newton_matrix(world, state, size, count, s, k):
 
 @kernel
 def factor_envelope(matrix, envelope, size):
-    """Overwrite the lower triangle by its Cholesky factor; return False if a pivot is not positive."""
+    """Overwrite the lower triangle by its Cholesky factor, inverse diagonal; False: a pivot is not positive."""
     for i in range(size):
         row = matrix[i]
         for j in range(envelope[i], i):
             total, other = row[j], matrix[j]
             for k in range(max(envelope[i], envelope[j]), j):
                 total -= row[k] * other[k]
-            row[j] = total / other[j]
+            row[j] = total * other[j]
         pivot = row[i]
         for k in range(envelope[i], i):
             pivot -= row[k] * row[k]
         if not pivot > 0.0:
             return False
-        row[i] = math.sqrt(pivot)
+        row[i] = 1.0 / math.sqrt(pivot)
     return True
 
 
 @kernel
 def solve_envelope(matrix, envelope, size, x):
-    """Solve L Lᵀ x = x in place."""
+    """Solve L Lᵀ x = x in place, with the factor of `factor_envelope`."""
     for i in range(size):
         total = x[i]
         for k in range(envelope[i], i):
             total -= matrix[i, k] * x[k]
-        x[i] = total / matrix[i, i]
+        x[i] = total * matrix[i, i]
     for i in range(size - 1, -1, -1):
-        x[i] /= matrix[i, i]
+        x[i] *= matrix[i, i]
         for k in range(envelope[i], i):
             x[k] -= matrix[i, k] * x[i]
 
