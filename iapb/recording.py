@@ -17,8 +17,8 @@ from iapb.advice.effects import Effect
 from iapb.compiled import address_of, block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
 from iapb.haptics.kernels import PLANNED
+from iapb.linalg import load, store
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
-from iapb.mechanics.kernels.vectors import load, store
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ContactTable, EffectRow, ImpactTable, Later, Run, blank, digests, quantities
 from iapb.scene.model import SpatialScene

@@ -27,10 +27,10 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.kernels import PLANNED, Port
 from iapb.haptics.waveforms import waveform_weights
+from iapb.linalg import cholesky
 from iapb.mechanics.free_motion import make_free_motion
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.arrays import make_workspace
-from iapb.mechanics.kernels.cholesky import cholesky
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ImpactTable, blank, quantities
 from iapb.scene import Scene, SpatialScene

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.dense import product
 from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
+from iapb.linalg import product
 
 HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
 HALF_SPACE, SPHERE, BOX = 3, 4, 5

@@ -23,9 +23,8 @@ from iapb.contact.kernels.border import (
 from iapb.contact.kernels.impact import apply_change, apply_projected_change, rank_tolerance
 from iapb.contact.kernels.projector import unit_columns
 from iapb.contact.kernels.unilateral import make_push_work, poisson_impact
-from iapb.dense import product, solve
 from iapb.errors import ArgumentError, RangeError, SolverError
-from iapb.mechanics.kernels.cholesky import to_whitened, whiten_columns
+from iapb.linalg import product, solve, to_whitened, whiten_columns
 
 Floats = NDArray[np.float64]
 Exponents = NDArray[np.int64]

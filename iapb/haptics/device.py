@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.compiled import Entry
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.kernels import NO_COUPLING, UNILATERAL, engage, observe_work
+from iapb.linalg import cholesky, solve_mass
 from iapb.mechanics.bodies import finite_array
-from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 
 Floats = NDArray[np.float64]
 

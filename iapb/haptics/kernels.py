@@ -9,13 +9,12 @@ import numpy as np
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import LARGEST_SPEED
+from iapb.linalg import add, cholesky, dot, load, solve_mass, transform
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
-from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 from iapb.mechanics.kernels.configuration import difference, integrate, integrate_body, is_vector
 from iapb.mechanics.kernels.dynamics import bias, mass_matrix
 from iapb.mechanics.kernels.free_motion import RIGID, FreeMotion, move_simple_trees
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
-from iapb.mechanics.kernels.vectors import add, dot, load, transform
 from iapb.run import FREE
 
 NO_COUPLING, FOUR_CHANNEL, UNILATERAL = 0, 1, 2

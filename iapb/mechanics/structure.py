@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.dense import product
+from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import FREE_FLYER, PLANAR_SE2, SPHERICAL
 from iapb.mechanics.kernels.arrays import MechanismArrays

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs
-from iapb.dense import product
 from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
+from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Joint
 from iapb.mechanics.mechanism import Mechanism

@@ -112,7 +112,7 @@ def urdf_path(text: str, folder: Path) -> Path:
 
 
 def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[str, Any]:
-    from iapb.dense import product  # brings numba along
+    from iapb.linalg import product  # brings numba along
     from iapb.mechanics.rotations import angles_of, rotation_of
 
     rotation, origin = link.placement

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.dense import product, solve
 from iapb.double_double import (
     add_product,
     kinetic_energies,
@@ -21,6 +20,7 @@ from iapb.double_double import (
     two_sum,
 )
 from iapb.elementary import arc_tangent, cosine, hypotenuse, sine, sine_cosine
+from iapb.linalg import product, solve
 
 NUMBERS = np.random.default_rng(8)
 ANGLES = np.concatenate([

@@ -13,7 +13,7 @@ from iapb import resolve_impact
 from iapb.compiled import block, kernel
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
 from iapb.errors import MissingDependencyError, SolverError
-from iapb.mechanics.kernels.cholesky import cholesky, from_whitened, to_whitened
+from iapb.linalg import cholesky, from_whitened, to_whitened
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 from verification.impacts import ImpactCase

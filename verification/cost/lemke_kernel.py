@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from iapb.mechanics.kernels.cholesky import cholesky
+from iapb.linalg import cholesky
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 
 lcp_lemke = import_lcp_lemke()

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from iapb.compiled import block, copy_into, kernel
 from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
-from iapb.mechanics.kernels.cholesky import cholesky
+from iapb.linalg import cholesky
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from iapb.contact.kernels.impact import ImpactWork, factored_impact, make_impact
 from iapb.contact.kernels.passive import gain_enclosure, passive_step
 from iapb.contact.kernels.projector import minimum_norm_impulses
 from iapb.double_double import kinetic_energies
-from iapb.mechanics.kernels.cholesky import cholesky
+from iapb.linalg import cholesky
 
 # |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as given, in which the skew
 # part cancels; the Cholesky factor is that of the symmetric part.

@@ -13,7 +13,7 @@ from iapb.contact.kernels.passive import passive_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
 from iapb.contact.kernels.rows import body_row, contact_row, direction_row, friction_of, tangent_of
 from iapb.contact.kernels.unilateral import poisson_impact
-from iapb.mechanics.kernels.vectors import load
+from iapb.linalg import load
 
 
 @kernel

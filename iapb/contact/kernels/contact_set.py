@@ -5,7 +5,7 @@ from __future__ import annotations
 from iapb.compiled import kernel
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.shape_frames import copy_contact
-from iapb.mechanics.kernels.vectors import dot, load, subtract
+from iapb.linalg import dot, load, subtract
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Two normals are aligned, and may belong to one surface, when the cosine of their angle is at least this: 31.8

@@ -16,11 +16,10 @@ import numpy as np
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import moving_tree
-from iapb.contact.kernels.impact_friction import along, slide, tangent_inertia
+from iapb.contact.kernels.impact_friction import slide, tangent_inertia
 from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
-from iapb.mechanics.kernels.cholesky import solve_tree_blocks
+from iapb.linalg import add, dot, dot_of, load, scale, solve_tree_blocks, store
 from iapb.mechanics.kernels.kinematics import add_point_force
-from iapb.mechanics.kernels.vectors import add, dot, load, scale, store
 
 SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, and the next step goes on from there
 STILL = 1e-6  # share of the fastest slip: a sweep that changes velocities by less is the last one
@@ -95,7 +94,7 @@ def add_step_friction(world, state):
 @kernel
 def passive_factor(p, slip, moved):
     """Return the largest α ≤ 1 with which friction does no positive work in the step: α p · slip + α² |moved|² ≤ 0."""
-    given, square = along(p, slip[: p.shape[0]]), along(moved, moved)
+    given, square = dot_of(p, slip[: p.shape[0]]), dot_of(moved, moved)
     if given >= 0.0:
         return 0.0
     return 1.0 if square <= -given else -given / square
@@ -179,7 +178,7 @@ def _start(world, state, count):
             for k in range(f.local.shape[0]):
                 f.local[k] += f.p[j] * f.rows[j, k]
         _give_back(world, f, r)
-    if along(f.p[: count * size], f.slip[: count * size]) + 0.5 * along(f.moved, f.moved) > 0.0:
+    if dot_of(f.p[: count * size], f.slip[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
         f.p[: count * size] = 0.0
         f.moved[:] = 0.0
 

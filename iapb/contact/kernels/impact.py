@@ -11,7 +11,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.passive import clamped_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
 from iapb.double_double import add_product, symmetric_entry
-from iapb.mechanics.kernels.cholesky import from_whitened, to_momentum, to_whitened, whiten_columns
+from iapb.linalg import from_whitened, to_momentum, to_whitened, whiten_columns
 
 UNIT_ROUNDOFF = 2.0**-53
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. The error of

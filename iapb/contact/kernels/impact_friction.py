@@ -16,6 +16,7 @@ from iapb.contact.kernels.impact import apply_change
 from iapb.contact.kernels.projector import add_minimum_norm, minimum_norm_factors, subtract_pushed
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
+from iapb.linalg import dot_of
 
 GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 
@@ -100,7 +101,7 @@ def split_tangents(lower, count, rank, work, f, d):
         row = f.free[j, :d]
         slip = before = left = 0.0
         for k in range(d):  # L x = row
-            row[k] = (row[k] - along(lower[k], row[:k])) / lower[k, k]
+            row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
             slip += row[k] * (u[k] + work.change[k])
             before += row[k] * row[k]
         f.slip[j] = slip
@@ -108,7 +109,7 @@ def split_tangents(lower, count, rank, work, f, d):
         f.normal_part[j, :rank] = 0.0
         for _ in range(2):  # twice is enough to be orthogonal to rounding (Kahan, in Parlett 1980)
             for i in range(rank):
-                overlap = along(work.basis[i], row)
+                overlap = dot_of(work.basis[i], row)
                 f.normal_part[j, i] += overlap
                 for k in range(d):
                     row[k] -= overlap * work.basis[i, k]
@@ -116,7 +117,7 @@ def split_tangents(lower, count, rank, work, f, d):
             left += row[k] * row[k]
         if left <= GONE * GONE * before:
             row[:] = 0.0
-    return math.sqrt(largest) * math.sqrt(along(u, u))
+    return math.sqrt(largest) * math.sqrt(dot_of(u, u))
 
 
 @kernel
@@ -128,7 +129,7 @@ def share_within_cone(count, f):
         largest = max(largest, abs(f.wanted[i]))
     for i in range(count):
         own, mu = f.p[i * size : (i + 1) * size], f.coefficient[i]
-        length = math.sqrt(along(own, own))
+        length = math.sqrt(dot_of(own, own))
         excess, room = length - mu * max(f.wanted[i], 0.0), mu * max(f.without[i], 0.0)
         if excess > mu * CONE_ROUNDING * largest and length > 0.0:
             share = min(share, room / (room + length - mu * f.wanted[i]))
@@ -138,8 +139,8 @@ def share_within_cone(count, f):
 @kernel
 def passive_share(u, change, moved):
     """Return the largest α in [0, 1] with ½|Δ_t|² α² + (u·Δ_t) α ≤ loss of the normal part: the sum gains no energy."""
-    square, slope = along(moved, moved), along(u, moved)
-    lost = max(0.0, -along(u, change) - 0.5 * along(change, change))
+    square, slope = dot_of(moved, moved), dot_of(u, moved)
+    lost = max(0.0, -dot_of(u, change) - 0.5 * dot_of(change, change))
     if square == 0.0 or 0.5 * square + slope <= lost:
         return 1.0
     root = math.sqrt(slope * slope + 2.0 * square * lost)
@@ -205,11 +206,11 @@ def settle_friction(count, rank, work, push, f, d, scale):
 def tangent_inertia(free, first, size):
     """Return the largest eigenvalue of B_i B_iᵀ, which has one or two rows."""
     x = free[first]
-    xx = along(x, x)
+    xx = dot_of(x, x)
     if size == 1:
         return xx
     y = free[first + 1]
-    yy, xy = along(y, y), along(x, y)
+    yy, xy = dot_of(y, y), dot_of(x, y)
     return 0.5 * (xx + yy) + hypotenuse(0.5 * (xx - yy), xy)
 
 
@@ -217,14 +218,14 @@ def tangent_inertia(free, first, size):
 def _start(count, rank, work, push, f, d):
     """Factor the normal rows and write the impulses without friction; return whether non-negative ones exist."""
     change, left = work.change[:d], f.left[:d]
-    length = math.sqrt(along(change, change))
+    length = math.sqrt(dot_of(change, change))
     for k in range(d):
         f.moved[k] = -change[k] / length if length > 0.0 else 0.0
     pushes = push_only(work.rows, count, f.moved[:d], f.without, left, push)
-    pushes = pushes and along(left, left) <= PUSHES * PUSHES
+    pushes = pushes and dot_of(left, left) <= PUSHES * PUSHES
     minimum_norm_factors(work.rows, work.length, count, d, work.basis, rank, work.columns, push.triangle)
     for j in range(rank):
-        f.target[j] = along(work.basis[j], change)
+        f.target[j] = dot_of(work.basis[j], change)
     _responses(count, rank, work, push, f)
     if not pushes:
         _least_norm_start(count, rank, work, push, f)
@@ -253,10 +254,10 @@ def _responses(count, rank, work, push, f):
 def _stride(f, i, size):
     """Return the factor 1/(1 − μ ∂p_n/∂p_t) on a limit's change: Newton's step for a single sliding contact."""
     own = f.p[i * size : (i + 1) * size]
-    length = math.sqrt(along(own, own))
+    length = math.sqrt(dot_of(own, own))
     if length == 0.0 or length < AT_LIMIT * f.radius[i]:
         return 1.0
-    gain = f.sliding[i] * along(f.response[i * size : (i + 1) * size], own) / length
+    gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
     return 1.0 / max(1.0 - gain, 1.0 / STRIDE)
 
 
@@ -292,7 +293,7 @@ def _move_normals(count, rank, work, push, f, near):
                 left[i] -= f.normal_part[j, i] * f.p[j]
     if near:
         subtract_pushed(count, rank, f.wanted, work.columns, push.triangle, f.moved, left)
-        defect = math.sqrt(along(left[:rank], left[:rank]))
+        defect = math.sqrt(dot_of(left[:rank], left[:rank]))
     else:
         f.wanted[:count] = 0.0
     add_minimum_norm(count, rank, left, work.columns, push.triangle, f.wanted)
@@ -302,7 +303,7 @@ def _move_normals(count, rank, work, push, f, near):
 @kernel
 def _settle(count, rank, work, push, f, d, scale, pushes):
     """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET times the scale."""
-    size, speed = f.velocity.shape[0], math.sqrt(along(work.u[:d], work.u[:d]))
+    size, speed = f.velocity.shape[0], math.sqrt(dot_of(work.u[:d], work.u[:d]))
     moved = math.inf
     for done in range(ROUNDS):
         defect = _move_normals(count, rank, work, push, f, pushes)
@@ -332,7 +333,7 @@ def _sweep_tangents(f, count, size, d, still):
         friction_sweeps(rows, f.slip, radius, f.inertia, p, f.moved[:d], f.velocity, SWEEPS - 1, SETTLED * moved)
     for i in range(count):
         own = p[i * size : (i + 1) * size]
-        length, change = math.sqrt(along(own, own)), abs(f.change[i])
+        length, change = math.sqrt(dot_of(own, own)), abs(f.change[i])
         if length >= radius[i] - STRIDE * change:
             moved = max(moved, f.inertia[i] * min(change, length))
     return moved
@@ -347,7 +348,7 @@ def _trim(count, rank, work, push, f, near):
         within = True
         for i in range(count):
             own, limit = f.p[i * size : (i + 1) * size], f.sliding[i] * max(f.wanted[i], 0.0)
-            length = math.sqrt(along(own, own))
+            length = math.sqrt(dot_of(own, own))
             if length > limit:
                 within = False
                 for a in range(size):
@@ -404,21 +405,12 @@ def combine(rows, weight, out):
 
 
 @kernel
-def along(row, vector):
-    """Return row · vector."""
-    total = 0.0
-    for k in range(vector.shape[0]):
-        total += row[k] * vector[k]
-    return total
-
-
-@kernel
 def slide(free, slip, radius, inertia, p, moved, velocity, first):
     """Move one contact's impulse to stop its slip, or towards its limit; return the change of velocity [m/s]."""
     size = velocity.shape[0]
     for a in range(size):
-        velocity[a] = slip[first + a] + along(free[first + a], moved)
-    fastest = math.sqrt(along(velocity, velocity))
+        velocity[a] = slip[first + a] + dot_of(free[first + a], moved)
+    fastest = math.sqrt(dot_of(velocity, velocity))
     if not _stops(free, radius, p, velocity, first):
         square = 0.0
         for a in range(size):
@@ -448,7 +440,7 @@ def _stops(free, radius, p, velocity, first):
     if velocity.shape[0] != 2:
         return False
     x, y = free[first], free[first + 1]
-    xx, yy, xy = along(x, x), along(y, y), along(x, y)
+    xx, yy, xy = dot_of(x, x), dot_of(y, y), dot_of(x, y)
     det = xx * yy - xy * xy
     if det <= SINGULAR * xx * yy:
         return False

@@ -25,7 +25,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import group_of_contact, moving_tree
 from iapb.contact.kernels.coulomb import contact_before
 from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
-from iapb.mechanics.kernels.vectors import add, load, scale, store
+from iapb.linalg import add, load, scale, store
 
 STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
 EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies

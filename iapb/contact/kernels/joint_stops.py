@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.rows import tangent_of
-from iapb.mechanics.kernels.vectors import add, cross, load, scale, store
+from iapb.linalg import add, cross, load, scale, store
 
 
 @kernel

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from iapb.compiled import kernel
+from iapb.linalg import dot_of, orthogonalize
 
 # A pivot is a residual row of at least this share of the longest one. A short residual has the rounding ε / ‖r‖ in its
 # direction. If only one direction is left, all rows tie, and without this rule rounding would choose the pivot.
@@ -204,22 +205,8 @@ def minimum_norm_factors(rows, length, count, d, basis, rank, tall, triangle):
                 total += rows[k, i] * basis[j, k]
             tall[j, i] = total * length[i]
     for j in range(rank):
-        before = 0.0
-        for i in range(count):
-            before += tall[j, i] * tall[j, i]
-        for m in range(j):
-            triangle[m, j] = 0.0
-        for _ in range(2):  # twice is enough for orthogonality to rounding
-            for m in range(j):
-                overlap = 0.0
-                for i in range(count):
-                    overlap += tall[m, i] * tall[j, i]
-                triangle[m, j] += overlap
-                for i in range(count):
-                    tall[j, i] -= overlap * tall[m, i]
-        square = 0.0
-        for i in range(count):
-            square += tall[j, i] * tall[j, i]
+        before = dot_of(tall[j], tall[j, :count])
+        square = orthogonalize(tall, j, count, triangle)
         reached = square > _NOISE * _NOISE * before
         triangle[j, j] = math.sqrt(square) if reached else 0.0
         for i in range(count):

@@ -6,8 +6,8 @@ import math
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.rows import add_body_row
+from iapb.linalg import dot, load, scale, store
 from iapb.mechanics.kernels.kinematics import add_point_force
-from iapb.mechanics.kernels.vectors import dot, load, scale, store
 
 
 @kernel

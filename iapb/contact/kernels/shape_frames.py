@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from iapb.compiled import kernel
-from iapb.mechanics.kernels.vectors import add, column, load, store, transform
+from iapb.linalg import add, column, load, store, transform
 
 # A feature number is (kind << 40) | (vertex << 20) | edge: vertex i of one shape against edge j of the other.
 # 20 bits hold a million vertices; shapes with more would need a different narrow phase anyway.
@@ -71,7 +71,7 @@ def store_in_plane(buffer, count, shapes, a, b, feature, x, y, nx, ny, gap):
     return store_in_space(buffer, count, shapes, a, b, feature, (x, y, 0.0), (nx, ny, 0.0), gap)
 
 
-# The same helpers in space, where vectors are tuples (see `iapb.mechanics.kernels.vectors`).
+# The same helpers in space, where vectors are tuples (see `iapb.linalg`).
 
 
 @kernel

@@ -17,7 +17,7 @@ from iapb.contact.kernels.shape_frames import (
     world_axis,
     world_center,
 )
-from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
+from iapb.linalg import add, cross, dot, load, scale, subtract
 
 
 @kernel

@@ -16,8 +16,8 @@ from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities, friction_of
+from iapb.linalg import add, cholesky, cholesky_tree_blocks, scale, solve_mass, solve_tree_blocks, subtract
 from iapb.mechanics.joints import SPHERICAL
-from iapb.mechanics.kernels.cholesky import cholesky, cholesky_tree_blocks, solve_mass, solve_tree_blocks
 from iapb.mechanics.kernels.configuration import integrate, integrate_body
 from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
 from iapb.mechanics.kernels.free_motion import (
@@ -32,7 +32,6 @@ from iapb.mechanics.kernels.free_motion import (
     to_fixed_axes,
 )
 from iapb.mechanics.kernels.kinematics import forward_kinematics
-from iapb.mechanics.kernels.vectors import add, scale, subtract
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may overflow: the motion has

@@ -13,6 +13,7 @@ import numpy as np
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.impact import apply_change, whiten_impact
+from iapb.linalg import orthogonalize
 
 # A row counts as closing if its speed exceeds this share of |b|, the rounding of a d-term sum of unit rows.
 _CLOSING = 1e-13
@@ -49,19 +50,7 @@ def _solve_passive(rows, b, passive, known, size, q, triangle, solution):
     for j in range(known, size):
         for k in range(d):
             q[j, k] = rows[k, passive[j]]
-        for m in range(j):
-            triangle[m, j] = 0.0
-        for _ in range(2):
-            for m in range(j):
-                overlap = 0.0
-                for k in range(d):
-                    overlap += q[m, k] * q[j, k]
-                triangle[m, j] += overlap
-                for k in range(d):
-                    q[j, k] -= overlap * q[m, k]
-        square = 0.0
-        for k in range(d):
-            square += q[j, k] * q[j, k]
+        square = orthogonalize(q, j, d, triangle)
         if square <= _CLOSING * _CLOSING:
             return j
         triangle[j, j] = math.sqrt(square)

@@ -9,8 +9,8 @@ from math import sqrt
 
 from iapb.compiled import kernel
 from iapb.elementary import arc_tangent, sine, sine_cosine
+from iapb.linalg import add, cross, dot, scale
 from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR_SE2, SPHERICAL
-from iapb.mechanics.kernels.vectors import add, cross, dot, scale
 
 # Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17, while the
 # closed forms lose digits: 1 - cos keeps eps / angle^2.

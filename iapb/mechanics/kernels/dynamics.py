@@ -6,8 +6,7 @@ composite's own centre of mass, where merging two bodies only adds positive term
 """
 
 from iapb.compiled import kernel
-from iapb.mechanics.joints import FREE_FLYER, PLANAR_SE2
-from iapb.mechanics.kernels.vectors import (
+from iapb.linalg import (
     accumulate,
     add,
     cross,
@@ -20,6 +19,7 @@ from iapb.mechanics.kernels.vectors import (
     transform,
     transform_back,
 )
+from iapb.mechanics.joints import FREE_FLYER, PLANAR_SE2
 
 
 @kernel

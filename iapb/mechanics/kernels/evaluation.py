@@ -7,12 +7,11 @@ from math import isfinite, sqrt
 
 from iapb.compiled import kernel
 from iapb.elementary import arc_tangent
+from iapb.linalg import add, cholesky, cross, dot, load, scale, solve_mass, subtract
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, PLANAR_SE2, SPHERICAL
-from iapb.mechanics.kernels.cholesky import cholesky, solve_mass
 from iapb.mechanics.kernels.configuration import difference, turn_vector
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
 from iapb.mechanics.kernels.kinematics import forward_kinematics, motion_at
-from iapb.mechanics.kernels.vectors import add, cross, dot, load, scale, subtract
 
 # Tolerance on the length of a given quaternion or (cos, sin) pair: single precision input passes.
 UNIT_TOLERANCE = 1e-6

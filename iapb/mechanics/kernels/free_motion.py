@@ -24,21 +24,22 @@ import numpy as np
 
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
-from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
-from iapb.mechanics.kernels.cholesky import solve_mass
-from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
-from iapb.mechanics.kernels.vectors import (
+from iapb.linalg import (
     add,
     column,
     cross,
     dot,
+    dot_of,
     load,
     scale,
+    solve_mass,
     store,
     subtract,
     transform,
     transform_back,
 )
+from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
+from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
 
 STRAIGHT, RIGID, LINKAGE = range(3)
 # rad in a step: below the first, one turn of second order is exact to rounding; beyond the others, several parts
@@ -247,12 +248,3 @@ def solve_root(mass, block, start, stop, base, p, v):
             total -= mass[start + i, j] * v[j]
         v[start + i] = total
     solve_mass(block, v[start : start + base], v[start : start + base])
-
-
-@kernel
-def dot_of(a, b):
-    """Return a · b of two vectors."""
-    total = 0.0
-    for k in range(a.shape[0]):
-        total += a[k] * b[k]
-    return total

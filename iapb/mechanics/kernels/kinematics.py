@@ -2,17 +2,7 @@
 
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
-from iapb.mechanics.joints import (
-    CONTINUOUS,
-    FIXED,
-    FREE_FLYER,
-    PLANAR,
-    PLANAR_SE2,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-)
-from iapb.mechanics.kernels.vectors import (
+from iapb.linalg import (
     add,
     column,
     cross,
@@ -24,6 +14,16 @@ from iapb.mechanics.kernels.vectors import (
     subtract,
     transform,
     turn_frame,
+)
+from iapb.mechanics.joints import (
+    CONTINUOUS,
+    FIXED,
+    FREE_FLYER,
+    PLANAR,
+    PLANAR_SE2,
+    PRISMATIC,
+    REVOLUTE,
+    SPHERICAL,
 )
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.mechanics.kernels.cholesky import (
+from iapb.linalg import (
     cholesky,
     from_whitened,
     solve_mass,
