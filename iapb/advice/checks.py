@@ -12,7 +12,7 @@ v Δt, and its spring then returns up to k times the kinetic energy of the appro
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,20 +20,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.advice.solids import joined, solids_of
 from iapb.contact.geometry import (
     BOX,
     ENDLESS,
-    POLYGON,
     ContactBuffer,
-    Shapes,
     contact_capacity,
     frame_along,
     make_contact_buffer,
 )
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.laws import FRICTION, IMPACT_FRICTION, IMPULSES, PENALTY, ContactLaw, ImpulseAugmented
-from iapb.mechanics.integrators import INTEGRATORS, Integrator
-from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import (
@@ -48,6 +46,7 @@ from iapb.scene.mechanism import (
 from iapb.scene.parts import LARGEST_NUMBER
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]  # numbers of contacts
 
 NEAR = 0.02  # of the smaller shape: contacts closer than this at the start count as touching
 DEEP = 0.02  # of the smaller shape: a larger overlap at the start is more than a resting depth
@@ -88,72 +87,63 @@ class StepLimits:
 
 
 class Start:
-    """A scene at its start: its closest contacts with their rows, effective masses and loads.
+    """A scene at its start: its closest contacts and joint limits, with their rows, effective masses and loads.
 
-    Parameters
-    ----------
-    scene : Scene
-    mechanism, shapes, pairs : of the scene, if the caller has them already; else they are made here.
+    A joint limit is a contact with one number, after those of the shapes, in place of its two shapes.
     """
 
-    def __init__(self, scene: Scene, mechanism: Mechanism | None = None, shapes: Shapes | None = None,
-                 pairs: NDArray[np.int32] | None = None) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
-        self.mechanism = mechanism_of(scene) if mechanism is None else mechanism
-        self.shapes = shapes_of(scene) if shapes is None else shapes
-        self.pairs = pairs_of(scene, self.shapes) if pairs is None else pairs
-        self.q, self.v = start_of(scene)
+        self.mechanism, self.shapes = mechanism_of(scene), shapes_of(scene)
+        self.pairs, (self.q, self.v) = pairs_of(scene, self.shapes), start_of(scene)
+        self.stops, solids = stops_of(scene, self.mechanism), solids_of(self.shapes)
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
-        self.size = np.array([_smallest_extent(self.shapes, i) for i in range(len(self.shapes.kind))])
         self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [wall.name for wall in scene.walls]
-        self.kind, self.radius = self.shapes.kind, self.shapes.radius
-        self.found = self._contacts()
-        self.rows = np.array([self._row(i, self.found.normal[i]) for i in range(len(self.found.gap))]).reshape(
-            -1, self.mechanism.nv)
-        if any(body.joint_limits for body in scene.bodies):
-            self._add_stops()
+        size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
+        for stop in self.stops:
+            body = scene.bodies[stop.body]
+            self.labels.append(f"the {'lower' if stop.sign > 0.0 else 'upper'} limit of {body.name}")
+            size.append(stop.arm * float(np.ptp(body.joint_limits or (0.0,))))
+        self.kind, self.radius = (np.append(each, np.full(len(self.stops), -1))
+                                  for each in (self.shapes.kind, self.shapes.radius))
+        self.size, self.found = np.array(size), self._contacts(size[: len(size) - len(self.stops)])
+        trees, (a, b) = self.mechanism.tree_of_body, (self.found.body_a, self.found.body_b)
+        self.tree_a, self.tree_b = trees[a], trees[np.where(b < 0, a, b)]  # at a wall the same
+        self.rows = self.rows_along(np.arange(len(self.found.gap)), self.found.normal)
+        for row, stop in zip(self.rows[len(self.rows) - len(self.stops) :], self.stops, strict=True):
+            row[self.mechanism.arrays.v_start[stop.body]] = stop.arm * stop.sign
         classes, table = frictions_of(scene)
         self.friction = table[classes[self.found.shape_a], classes[self.found.shape_b]]
         self.thickness = np.minimum(self.size[self.found.shape_a], self.size[self.found.shape_b])
 
-    def _contacts(self) -> ContactBuffer:
-        """Return the contacts between the closest features of each pair, near or far."""
-        finite = self.size[np.isfinite(self.size)]
-        few = len(self.pairs) <= MANY_PAIRS
-        buffer, count = make_contact_buffer(_room(self.shapes, self.pairs, few)), 0
-        if len(self.pairs):
-            margin = math.inf if few else float(finite.max(initial=0.0))
-            count = detect(self.shapes, self.pairs, *self.mechanism.placements(self.q), margin, buffer)
-        columns: list[Any] = [column[: max(int(count), 0)] for column in buffer]
+    def _contacts(self, sizes: list[float]) -> ContactBuffer:
+        """Return the contacts between the closest features of each pair, near or far, and those of joint limits."""
+        few, kind, places = len(self.pairs) <= MANY_PAIRS, self.shapes.kind, self.mechanism.placements(self.q)
+        corners = np.where(kind == BOX, 8, np.maximum(self.shapes.count, 2))
+        room = int(corners[self.pairs].sum()) + 32 if few else contact_capacity(self.shapes, self.pairs)
+        margin = math.inf if few else max((size for size in sizes if size < math.inf), default=0.0)
+        out = make_contact_buffer(room + len(self.stops))
+        count = max(int(detect(self.shapes, self.pairs, *places, margin, out)), 0) if len(self.pairs) else 0
+        for k, stop in enumerate(self.stops):
+            i, place = count + k, self.q[self.mechanism.arrays.q_start[stop.body]]
+            out.gap[i], out.normal[i] = stop.arm * stop.sign * (place - stop.bound), 0.0
+            out.shape_a[i] = out.shape_b[i] = len(kind) + k
+            out.body_a[i], out.body_b[i], out.point[i] = stop.body, stop.parent, places[1][stop.body]
+        columns: list[Any] = [column[: count + len(self.stops)] for column in out]
         return ContactBuffer(*columns)
 
-    def _add_stops(self) -> None:
-        """Append rows and gaps of the joint limits; a stop has one number in place of its two shapes."""
-        stops, arrays, first = stops_of(self.scene, self.mechanism), self.mechanism.arrays, len(self.shapes.kind)
-        names, ranges = [body.name for body in self.scene.bodies], [body.joint_limits for body in self.scene.bodies]
-        extra, rows = make_contact_buffer(len(stops)), np.zeros((len(stops), self.mechanism.nv))
-        for i, stop in enumerate(stops):
-            low, high = ranges[stop.body] or (0.0, 0.0)
-            extra.gap[i] = stop.arm * stop.sign * (self.q[arrays.q_start[stop.body]] - stop.bound)
-            rows[i, arrays.v_start[stop.body]] = stop.arm * stop.sign
-            extra.shape_a[i] = extra.shape_b[i] = first + i
-            extra.body_a[i], extra.body_b[i] = stop.body, stop.parent
-            self.labels.append(f"the {'lower' if stop.sign > 0.0 else 'upper'} limit of {names[stop.body]}")
-            self.size = np.append(self.size, stop.arm * (high - low))
-        places = self.mechanism.placements(self.q)[1]
-        extra.point[:] = places[extra.body_a]
-        columns: list[Any] = [np.concatenate([self.found[k], column]) for k, column in enumerate(extra)]
-        self.found, self.rows = ContactBuffer(*columns), np.concatenate([self.rows, rows])
-        self.kind = np.append(self.kind, np.full(len(stops), -1, self.kind.dtype))
-        self.radius = np.append(self.radius, np.zeros(len(stops)))
+    def rows_along(self, contacts: Rows, directions: Floats) -> Floats:
+        """Return the Jacobian rows (k, d) of contacts (k,) along directions (k, 3)."""
+        qs, point = np.tile(self.q, (len(contacts), 1)), self.found.point[contacts]
+        a, b = (self.mechanism.rows_along(qs, body[contacts], point, directions)
+                for body in (self.found.body_a, self.found.body_b))
+        return a - b
 
-    def _row(self, i: int, direction: Floats) -> Floats:
-        """Return the Jacobian row (d,) of contact i along a direction."""
-        row = np.zeros(self.mechanism.nv)
-        for body, sign in ((self.found.body_a[i], 1.0), (self.found.body_b[i], -1.0)):
-            if body >= 0:
-                row += sign * direction @ self.mechanism.point_jacobian(self.q, int(body), self.found.point[i])
-        return row
+    def slips(self, i: int) -> Floats:
+        """Jacobian rows of contact i across its normal: one in the plane, two in space."""
+        n = self.found.normal[i]
+        across = frame_along("normal", n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
+        return self.rows_along(np.full(len(across), i), across)
 
     @cached_property
     def blocks(self) -> list[tuple[slice, Floats]]:
@@ -169,85 +159,104 @@ class Start:
             out[part] = inverse @ rows.T[part]
         return out
 
-    @cached_property
-    def applied(self) -> Floats:
-        """Generalized force of gravity and of the hand at the start (d,)."""
-        return self._applied_at(self.q)
+    def mobility(self, rows: Floats) -> float:
+        """Largest eigenvalue of J M⁻¹ Jᵀ [1/kg]."""
+        return float(np.linalg.eigvalsh(rows @ self.moved(rows))[-1]) if len(rows) else 0.0
 
-    def _applied_at(self, q: Floats) -> Floats:
+    def applied(self, q: Floats) -> Floats:
         """Generalized force (d,) at q of gravity and of the hand's force at t = 0."""
         force, hand = -self.mechanism.gravity(q, self.gravity), self.scene.hand
         pushes = hand.forces([0.0])[0] if hand is not None else []
         if hand is not None and any(pushes):
             body = self.mechanism.index(hand.body)
             R, p = self.mechanism.placements(q)
-            flat = len(pushes) == 3
-            wrench = np.array([*pushes[:2], 0.0, 0.0, 0.0, pushes[2]] if flat else pushes)
+            wrench = np.array([*pushes[:2], 0.0, 0.0, 0.0, pushes[2]] if len(pushes) == 3 else pushes)
             point = p[body] + R[body] @ np.array([*hand.point, 0.0][:3])
             force += wrench[:3] @ self.mechanism.point_jacobian(q, body, point)
             force += wrench[3:] @ self.mechanism.frame_jacobian(q, body)[3:]
         return force
 
     @cached_property
-    def by_pair(self) -> list[NDArray[np.int64]]:
+    def fall(self) -> Floats:
+        """Acceleration (d,) at the start by gravity and the hand, without contacts and without motion."""
+        return self.moved(self.applied(self.q)[None])[:, 0]
+
+    @cached_property
+    def pull(self) -> Floats:
+        """Acceleration (c,) of each gap [m/s²] by gravity and the hand."""
+        return self.rows @ self.fall
+
+    @cached_property
+    def meeting(self) -> tuple[Floats, Floats]:
+        """When each gap closes at constant acceleration [s], infinite if never, and with which speed [m/s]."""
+        gap, approach = np.maximum(self.found.gap, 0.0), -(self.rows @ self.v)
+        square = approach**2 - 2.0 * self.pull * gap
+        speed, time = np.sqrt(np.maximum(square, 0.0)), np.where(gap == 0.0, 0.0, math.inf)
+        np.divide(2.0 * gap, approach + speed, out=time, where=approach + speed > 0.0)
+        return np.where(square < 0.0, math.inf, time), speed
+
+    @cached_property
+    def by_pair(self) -> list[Rows]:
         """Contacts of each pair of shapes, closest first: at most 4 in space and 2 in the plane, as on a flat face."""
-        most = 4 if self.spatial else 2
         kept: dict[tuple[int, int], list[int]] = {}
         for i, pair in enumerate(zip(self.found.shape_a.tolist(), self.found.shape_b.tolist(), strict=True)):
             kept.setdefault(pair, []).append(i)
-        return [np.array(sorted(rows, key=lambda i: float(self.found.gap[i]))[:most]) for rows in kept.values()]
+        return [np.array(sorted(rows, key=lambda i: float(self.found.gap[i]))[: 4 if self.spatial else 2])
+                for rows in kept.values()]
 
     @cached_property
-    def touching(self) -> list[NDArray[np.int64]]:
+    def touching(self) -> list[Rows]:
         """Contacts that touch or nearly touch at the start, in groups that shared moving trees connect."""
         near = np.flatnonzero(self.found.gap <= NEAR * np.where(np.isfinite(self.thickness), self.thickness, 0.0))
-        group: dict[int, int] = {}
-
-        def first(tree: int) -> int:
-            while group.setdefault(tree, tree) != tree:
-                tree = group[tree]
-            return tree
-
-        for i in near.tolist():
-            trees = self.trees(i)
-            for tree in trees[1:]:
-                group[first(tree)] = first(trees[0])
-        found: dict[int, list[int]] = {}
-        for i in near.tolist():
-            found.setdefault(first(self.trees(i)[0]), []).append(i)
-        return [np.array(rows) for rows in found.values()]
-
-    def trees(self, i: int) -> list[int]:
-        """The trees that contact i touches."""
-        bodies = [int(b) for b in (self.found.body_a[i], self.found.body_b[i]) if b >= 0]
-        return list(dict.fromkeys(int(self.mechanism.tree_of_body[b]) for b in bodies))
-
-    def is_free(self, tree: int) -> bool:
-        """Whether a tree is one free body (planar or free-flyer joint) that the hand does not hold."""
-        bodies = [self.scene.bodies[b] for b in np.flatnonzero(self.mechanism.tree_of_body == tree)]
-        held = self.scene.hand is not None and any(body.name == self.scene.hand.body for body in bodies)
-        return len(bodies) == 1 and bodies[0].joint in ("planar", "free_flyer") and not held
+        both = self.tree_a[near], self.tree_b[near]
+        group = joined(len(self.mechanism.tree_dofs), zip(*both, strict=True))[both[0]]
+        return [near[group == one] for one in dict.fromkeys(group.tolist())]
 
     @cached_property
-    def supports(self) -> list[NDArray[np.int64]]:
+    def supports(self) -> list[Rows]:
         """Groups of contacts that carry loads: those that touch, and the first pair that a falling tree hits."""
-        touched = {tree for rows in self.touching for i in rows for tree in self.trees(i)}
-        pull = self.rows @ self.moved(self.applied[None])[:, 0]
-        falls: dict[int, tuple[float, NDArray[np.int64]]] = {}
+        touched = {int(tree[i]) for rows in self.touching for i in rows for tree in (self.tree_a, self.tree_b)}
+        falls: dict[int, Rows] = {}
         for rows in self.by_pair:
-            tree, gap = self.trees(rows[0])[0], float(self.found.gap[rows[0]])
+            i, tree = int(rows[0]), int(self.tree_a[rows[0]])
             free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1  # a linkage would change its pose
-            flat = len(rows) > 1 or self.radius[self.found.shape_a[rows[0]]] > 0.0  # not on one corner
-            if tree in touched or not (free and flat and pull[rows[0]] < 0.0):
-                continue
-            if gap < falls.get(tree, (math.inf, rows))[0]:
-                falls[tree] = gap, rows
-        return [*self.touching, *(rows for _, rows in falls.values())]
+            flat = len(rows) > 1 or self.radius[self.found.shape_a[i]] > 0.0  # not on one corner
+            if tree not in touched and free and flat and self.pull[i] < 0.0:
+                falls[tree] = min(falls.get(tree, rows), rows, key=lambda rows: float(self.found.gap[rows[0]]))
+        return [*self.touching, *falls.values()]
+
+    @cached_property
+    def critical(self) -> tuple[tuple[float, Rows], tuple[float, Rows]]:
+        """Largest mobility [1/kg] and its contacts, twice: over touching groups and near pairs, and over near pairs.
+
+        The row of a near pair is also valid at touch; two boxes in space must be near for that.
+        """
+        nobody = (0.0, np.zeros(0, np.int64))
+        boxes = (self.kind[self.found.shape_a] == BOX) & (self.kind[self.found.shape_b] == BOX)
+        near = ~boxes | (self.found.gap <= self.thickness)
+        meeting = [(self.mobility(self.rows[rows]), rows) for rows in self.by_pair if near[rows[0]]]
+        lasting = [(self.mobility(self.rows[rows]), rows) for rows in self.touching]
+        return (max([*lasting, *meeting], key=lambda one: one[0], default=nobody),
+                max(meeting, key=lambda one: one[0], default=nobody))
+
+    def loads(self, rows: Rows) -> Floats:
+        """Return forces p >= 0 (c,) [N] of a group of contacts that balance gravity and the hand: W p = −J M⁻¹ f."""
+        W, force = self.rows[rows] @ self.moved(self.rows[rows]), np.zeros(len(rows))
+        pushing = np.ones(len(rows), np.bool_)
+        for _ in range(len(rows)):
+            force[:] = 0.0
+            force[pushing] = np.linalg.lstsq(W[np.ix_(pushing, pushing)], -self.pull[rows][pushing], rcond=1e-12)[0]
+            if (force >= 0.0).all():
+                break
+            pushing &= force > 0.0  # a contact that would pull carries nothing
+        hand = self.scene.hand.largest_force() if self.scene.hand is not None else 0.0
+        weights = float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies)
+        return np.clip(force, 0.0, weights + hand)  # wedges and levers can give more, but less in other poses
 
     @cached_property
     def resting(self) -> Floats:
         """Normal forces (c,) [N] that would hold the start in equilibrium; 0 at contacts that do not touch."""
-        force = np.zeros(len(self.found.gap))
+        force = np.zeros(len(self.rows))
         for rows in self.touching:
             force[rows] = self.loads(rows)
         return force
@@ -258,123 +267,36 @@ class Start:
         named = list(dict.fromkeys(self.labels[s] for s in shapes))
         return " and ".join(named) if len(named) < 3 else f"{', '.join(named[:3])}{' …' if len(named) > 3 else ''}"
 
-    def mobility(self, rows: Floats) -> float:
-        """Largest eigenvalue of J M⁻¹ Jᵀ [1/kg]."""
-        return float(np.linalg.eigvalsh(rows @ self.moved(rows))[-1]) if len(rows) else 0.0
 
-    @cached_property
-    def critical(self) -> tuple[tuple[float, NDArray[np.int64]], tuple[float, NDArray[np.int64]]]:
-        """Largest mobility [1/kg] and its contacts, twice: over touching groups and near pairs, and over near pairs."""
-        nobody = (0.0, np.zeros(0, np.int64))
-        pairs = [rows for rows in self.by_pair if self.is_near(rows[0])]
-        lasting, meeting = ([(self.mobility(self.rows[rows]), rows) for rows in each]
-                            for each in ([*self.touching, *pairs], pairs))
-        return tuple(max(each, key=lambda one: one[0], default=nobody)  # type: ignore[return-value]
-                     for each in (lasting, meeting))
+def step_limits(start: Start, integrator: str = "semi_implicit_euler") -> StepLimits | None:
+    """Return the limits at the most critical contacts; None if nothing can touch."""
+    method, dt, contact, (x, y) = INTEGRATORS[integrator], start.dt, start.scene.contact, np.eye(2)
 
-    def is_near(self, i: int) -> bool:
-        """Whether the row of contact i is also valid at touch; two boxes in space must be near for that."""
-        boxes = self.kind[self.found.shape_a[i]] == BOX and self.kind[self.found.shape_b[i]] == BOX
-        return not boxes or bool(self.found.gap[i] <= self.thickness[i])
+    def holds(k: float, b: float) -> bool:
+        q, v = method.step(lambda q, v, dt: q + dt * v, lambda q, v: -k * q - b * v, x, y, 1.0)
+        return float(np.abs(np.linalg.eigvals([q, v])).max()) <= 1.0 + ROUNDED
 
-    def loads(self, rows: NDArray[np.int64]) -> Floats:
-        """Return forces p >= 0 (c,) [N] of a group of contacts that balance gravity and the hand: W p = −J M⁻¹ f."""
-        J, force = self.rows[rows], np.zeros(len(rows))
-        W, wanted = J @ self.moved(J), -J @ self.moved(self.applied[None])[:, 0]
-        pushing = np.ones(len(rows), np.bool_)
-        for _ in range(len(rows)):
-            force[:] = 0.0
-            force[pushing] = np.linalg.lstsq(W[np.ix_(pushing, pushing)], wanted[pushing], rcond=1e-12)[0]
-            if (force >= 0.0).all():
-                break
-            pushing &= force > 0.0  # a contact that would pull carries nothing
-        return np.clip(force, 0.0, self.total_load)  # wedges and levers can give more, but less in other poses
+    def limits(mobility: float, rows: Rows, most: float) -> StepLimits:
+        k, b = contact.stiffness * mobility * dt**2, contact.damping * mobility * dt
+        stiffness = _largest(lambda x: x <= most and holds(x, b), 4.0) / (mobility * dt**2)
+        damping = _largest(lambda x: holds(k, x), 4.0) / (mobility * dt)
+        longest = _largest(lambda x: k * x**2 <= most and holds(k * x**2, b * x), 1e6) * dt
+        rate = 1.0 / longest if longest else math.inf
+        return StepLimits(start.names(rows), len(rows), 1.0 / mobility, stiffness, damping, rate)
 
-    @cached_property
-    def at_stops(self) -> dict[int, float]:
-        """Static forces [N] at the joint limits that do not touch, each with its own joint moved to the limit.
-
-        The force of a stop balances the load of its own joint alone, as if the joints behind it were fixed.
-        """
-        stops, touching = stops_of(self.scene, self.mechanism), {int(i) for rows in self.touching for i in rows}
-        arrays, held = self.mechanism.arrays, {}
-        for i, stop in enumerate(stops, len(self.found.gap) - len(stops)):
-            there = self.q.copy()
-            there[arrays.q_start[stop.body]] = stop.bound
-            load = float(self._applied_at(there)[arrays.v_start[stop.body]])
-            if i not in touching:
-                held[i] = max(-stop.sign * load / stop.arm, 0.0)
-        return held
-
-    @cached_property
-    def total_load(self) -> float:
-        """Sum of all weights and the hand's largest force [N]."""
-        hand = self.scene.hand
-        pushed = hand.largest_force() if hand is not None else 0.0
-        return float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies) + pushed
+    found = [limits(*one, most) for one, most in zip(start.critical, (math.inf, THROWN), strict=True) if one[0]]
+    return min(found, key=lambda one: (one.stiffness, one.damping), default=None)
 
 
-def _room(shapes: Shapes, pairs: NDArray[np.int32], few: bool) -> int:
-    """Capacity for the contacts of all pairs; with few pairs, for contacts at any distance."""
-    if not few:
-        return contact_capacity(shapes, pairs)
-    corners = np.where(shapes.kind == BOX, 8, np.maximum(shapes.count, 2))
-    return int(corners[pairs].sum()) + 32
-
-
-def _smallest_extent(shapes: Shapes, i: int) -> float:
-    """Smallest width of a shape [m]; infinite for half-planes and half-spaces."""
-    if shapes.kind[i] in ENDLESS:
-        return math.inf
-    if shapes.kind[i] == BOX:
-        return 2.0 * float(shapes.half_size[i].min())
-    if shapes.kind[i] != POLYGON:
-        return 2.0 * float(shapes.radius[i])
-    corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
-    edges = np.roll(corners, -1, axis=0) - corners
-    normals = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.hypot(edges[:, 0], edges[:, 1])[:, None]
-    return float((np.einsum("ei,vi->ev", normals, corners) - np.sum(normals * corners, axis=1)[:, None]).max(1).min())
-
-
-def holds(integrator: Integrator, k: float, b: float) -> bool:
-    """Whether a contact with k = K Δt²/m and b = B Δt/m is stable under the integrator."""
-    def step(x: float, v: float) -> tuple[float, float]:
-        q, rate = integrator.step(
-            lambda q, v, dt: q + dt * v, lambda q, v: -k * q - b * v, np.array([x]), np.array([v]), 1.0)
-        return float(q[0]), float(rate[0])
-
-    (a, c), (d, e) = step(1.0, 0.0), step(0.0, 1.0)
-    return float(np.abs(np.linalg.eigvals([[a, d], [c, e]])).max()) <= 1.0 + ROUNDED
-
-
-def _largest(good: Any, high: float) -> float:
+def _largest(good: Callable[[float], bool], high: float) -> float:
     """Return the largest x in (0, high] with good(x), or 0 if there is none; good is true up to some x."""
+    low = 0.0
     if good(high):
         return high
-    low = 0.0
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if good(middle) else (low, middle)
     return low if low > 1e-9 * high else 0.0
-
-
-def step_limits(start: Start, integrator: str = "semi_implicit_euler") -> StepLimits | None:
-    """Return the limits at the most critical contacts; None if nothing can touch."""
-    lasting, meeting = start.critical
-    found = [_limits(start, INTEGRATORS[integrator], *one, thrown) for one, thrown in ((lasting, math.inf),
-                                                                                      (meeting, THROWN)) if one[0]]
-    return min(found, key=lambda one: (one.stiffness, one.damping), default=None)
-
-
-def _limits(start: Start, method: Integrator, mobility: float, rows: NDArray[np.int64], most: float) -> StepLimits:
-    """Return the limits for contacts of one mobility, with k at most `most`."""
-    dt, contact = start.dt, start.scene.contact
-    k, b = contact.stiffness * mobility * dt**2, contact.damping * mobility * dt
-    stiffness = _largest(lambda x: x <= most and holds(method, x, b), 4.0) / (mobility * dt**2)
-    damping = _largest(lambda x: holds(method, k, x), 4.0) / (mobility * dt)
-    longest = _largest(lambda x: k * x**2 <= most and holds(method, k * x**2, b * x), 1e6) * dt
-    rate = 1.0 / longest if longest else math.inf
-    return StepLimits(start.names(rows), len(rows), 1.0 / mobility, stiffness, damping, rate)
 
 
 def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, ...]:
@@ -392,14 +314,13 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
     """
     chosen: Any = ImpulseAugmented() if law is None else law
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
-    start = Start(settled(scene)[0])
-    uses: frozenset[str] = getattr(chosen, "uses", frozenset())
+    start, uses = Start(settled(scene)[0]), frozenset[str](getattr(chosen, "uses", ()))
     found = [*_degrees(scene), *_overlaps(start), *_fast(start)]
     if PENALTY in uses:
         found += _sags(start)
-        if scene.contact.forces == "paper":
-            found += _too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler"))
-            found += _overdriven_friction(start) if FRICTION in uses else ()
+    if PENALTY in uses and scene.contact.forces == "paper":
+        found += _too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler"))
+        found += _overdriven_friction(start) if FRICTION in uses else ()
     if IMPULSES in uses and IMPACT_FRICTION not in uses and start.scene.contact.self_collision_rows == "relative":
         found += _slips_through_impacts(start)
     return tuple(found)
@@ -412,98 +333,80 @@ def _degrees(scene: Scene) -> Iterator[Caution]:
     another run is rarely a whole number. A joint may turn several times, so its start and limits raise a warning only
     if they are multiples of 45 (45 rad are seven turns).
     """
-    for path, angle, unit in _angles(scene):
+    angles: list[tuple[tuple[str | int, ...], float, int]] = []  # path, value [rad], what degrees are multiples of
+    plain = scene.resolved()
+    for part in ("bodies", "walls"):
+        for i, one in enumerate(plain[part]):
+            shapes = [((part, i, "shapes", k), shape) for k, shape in enumerate(one.get("shapes", ()))]
+            for path, placed in [((part, i), one), *shapes]:
+                angles += [((*path, "angle"), placed["angle"], 1)] if "angle" in placed else []
+                angles += [((*path, "rpy", k), x, 1) for k, x in enumerate(placed.get("rpy", ()))]
+    for i, body in enumerate(scene.bodies):
+        if body.joint == "planar" and len(body.position) == 3:
+            angles.append((("bodies", i, "position", 2), body.position[2], 1))
+        for field in ("position", "joint_limits") if body.joint == "revolute" else ():
+            angles += [(("bodies", i, field, k), x, MANY_TURNS) for k, x in enumerate(getattr(body, field) or ())]
+    for path, angle, unit in angles:
         if abs(angle) > math.tau and angle % unit == 0.0:
             name = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)[1:]
             yield Caution("degrees", name, f"{scene.place_of(*path)}{name} = {angle:g} rad looks like degrees: set "
                           f"{math.radians(angle):.6g}, for angles are in radians")
 
 
-def _angles(scene: Scene) -> Iterator[tuple[tuple[str | int, ...], float, int]]:
-    """Yield the path and value [rad] of each angle, and the number whose multiples look like degrees."""
-    plain = scene.resolved()
-    for part in ("bodies", "walls"):
-        for i, one in enumerate(plain[part]):
-            shapes = [((part, i, "shapes", k), shape) for k, shape in enumerate(one.get("shapes", ()))]
-            for path, placed in [((part, i), one), *shapes]:
-                yield from (((*path, "angle"), placed["angle"], 1),) if "angle" in placed else ()
-                yield from (((*path, "rpy", k), x, 1) for k, x in enumerate(placed.get("rpy", ())))
-    for i, body in enumerate(scene.bodies):
-        if body.joint == "planar" and len(body.position) == 3:
-            yield ("bodies", i, "position", 2), body.position[2], 1
-        if body.joint == "revolute":
-            yield from ((("bodies", i, "position", k), x, MANY_TURNS) for k, x in enumerate(body.position))
-            limits = body.joint_limits or ()
-            yield from ((("bodies", i, "joint_limits", k), x, MANY_TURNS) for k, x in enumerate(limits))
-
-
 def _overlaps(start: Start) -> Iterator[Caution]:
     """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the shape."""
-    found = start.found
-    sides: dict[int, list[int]] = {}
+    found, sides = start.found, dict[int, list[int]]()
     for rows in start.by_pair:
         i = int(rows[0])
-        depth, size = -float(found.gap[i]), float(start.thickness[i])
+        depth, (a, b) = -float(found.gap[i]), (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
         if depth <= 0.0 or not _too_deep(start, rows):
             continue
         if found.body_b[i] < 0:
             sides.setdefault(int(found.body_a[i]), []).append(i)
-        a, b = start.labels[found.shape_a[i]], start.labels[found.shape_b[i]]
+        kind, says = "overlap", f"{a} starts {in_metres(depth)} inside {b}, and "
         out = ", ".join(f"{depth * x:.3g}" for x in found.normal[i][: 3 if start.spatial else 2])
-        stored = 0.5 * start.scene.contact.stiffness * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
-        if start.kind[found.shape_b[i]] in ENDLESS and depth >= size:
-            yield Caution("outside", f"{a} and {b}", f"{a} starts behind {b}, {in_metres(depth)} deep: "
-                          f"move it by [{out}] m")
+        remedy = f": move it by [{out}] m"
+        if start.kind[found.shape_b[i]] in ENDLESS and depth >= start.thickness[i]:
+            kind, says = "outside", f"{a} starts behind {b}, {in_metres(depth)} deep"
         elif float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0]) <= 1e-12 * start.critical[0][0]:
-            yield Caution("overlap", f"{a} and {b}", f"{a} starts {in_metres(depth)} inside {b}, and no joint can move "
-                          f"it out: move it by [{out}] m, or take the shape or the wall away")
+            says, remedy = f"{says}no joint can move it out", f"{remedy}, or take the shape or the wall away"
         else:
-            yield Caution("overlap", f"{a} and {b}", f"{a} starts {in_metres(depth)} inside {b}, and {stored:.3g} J in "
-                          f"the contact's spring throw it out: move it by [{out}] m")
+            stored = 0.5 * start.scene.contact.stiffness * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
+            says += f"{stored:.3g} J in the contact's spring throw it out"
+        yield Caution(kind, f"{a} and {b}", f"{says}{remedy}")
     for rows_of_body in sides.values():
         for n, i in enumerate(rows_of_body):
-            against = [j for j in rows_of_body[:n] if float(found.normal[i] @ found.normal[j]) < -0.5]
-            for j in against[:1]:
+            for j in [j for j in rows_of_body[:n] if float(found.normal[i] @ found.normal[j]) < -0.5][:1]:
                 a, b, c = (start.labels[s] for s in (found.shape_a[i], found.shape_b[j], found.shape_b[i]))
-                wide = -float(found.gap[i] + found.gap[j])
                 yield Caution("wedged", f"{a}, {b}, {c}", f"{a} stands in a gap between {b} and {c} that is "
-                              f"{in_metres(wide)} narrower than it: widen the gap, or make {a} smaller")
+                              f"{in_metres(-float(found.gap[i] + found.gap[j]))} narrower than it: widen the gap, or "
+                              f"make {a} smaller")
 
 
-def _too_deep(start: Start, rows: NDArray[np.int64]) -> bool:
+def _too_deep(start: Start, rows: Rows) -> bool:
     """Whether a pair starts deeper than at rest, judged by its depth and by the energy of its springs."""
-    gap = np.minimum(start.found.gap[rows], 0.0)
+    gap, J = np.minimum(start.found.gap[rows], 0.0), start.rows[rows]
     depth, size, K = -float(gap.min()), float(start.thickness[rows[0]]), start.scene.contact.stiffness
     if depth * K <= 2.0 * float(start.resting[rows].max()):
         return False
-    if depth > DEEP * size:
-        return True
-    moved = start.moved(start.rows[rows])
-    mass = 1.0 / max(float(np.max(np.sum(start.rows[rows] * moved.T, axis=1))), 1e-300)
-    closing = float(np.abs(start.rows[rows] @ start.v).max())
-    weight = float(np.abs(start.rows[rows] @ start.moved(start.applied[None])[:, 0]).max()) * mass
-    usual = 0.5 * mass * closing**2 + weight * DEEP * size
-    usual = max(usual, 0.5 * mass * size**2)  # moving by its size in a second
-    return depth > 1e-6 * size and 0.5 * K * float(np.sum(gap**2)) > usual
+    mass = 1.0 / max(float(np.max(np.sum(J * start.moved(J).T, axis=1))), 1e-300)
+    kinetic, weight = 0.5 * mass * np.abs(J @ start.v).max() ** 2, mass * np.abs(start.pull[rows]).max()
+    usual = max(kinetic + weight * DEEP * size, 0.5 * mass * size**2)  # the latter: moving by its size in a second
+    return bool(depth > DEEP * size or depth > 1e-6 * size and 0.5 * K * np.sum(gap**2) > usual)
 
 
 def _fast(start: Start) -> Iterator[Caution]:
     """Warn of bodies that move by more than half of a shape in the step of the impact."""
-    pull = start.rows @ start.moved(start.applied[None])[:, 0]
-    for rows in start.by_pair:
-        i = int(rows[0])
-        gap, size = max(float(start.found.gap[i]), 0.0), float(start.thickness[i])
-        approach, force = -float(start.rows[i] @ start.v), -float(pull[i])
-        if approach <= 0.0 and force <= 0.0 or approach**2 + 2.0 * force * gap < 0.0:
+    for i in (int(rows[0]) for rows in start.by_pair):
+        (time, speed), size = (float(x[i]) for x in start.meeting), float(start.thickness[i])
+        leaving = start.rows[i] @ start.v >= 0.0 and start.pull[i] >= 0.0
+        if leaving or time > start.scene.duration or speed * start.dt <= 0.5 * size:
             continue
-        speed = math.sqrt(approach**2 + 2.0 * force * gap)
-        late = 2.0 * gap > (approach + speed) * start.scene.duration
-        if late or speed * start.dt <= 0.5 * size:
-            continue
-        thin, other = (start.labels[s] for s in _thin_first(start, i))
+        shapes = sorted((start.found.shape_b[i], start.found.shape_a[i]), key=lambda s: start.size[s])
+        thin, other = (start.labels[s] for s in shapes)
         yield Caution("fast", f"{thin} and {other}", f"{other} meets {thin} at {speed:.3g} m/s, "
                       f"{in_metres(speed * start.dt)} in a step, and the thinner is {in_metres(size)}: it sinks in or "
-                      f"passes through; set rate >= {_up(4.0 * speed / size)} Hz")
+                      f"passes through; set rate >= {_up(4.0 * speed / size):g} Hz")
 
 
 def _slips_through_impacts(start: Start) -> Iterator[Caution]:
@@ -514,43 +417,29 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
     resting friction removes the same slip within Δv/(μ a), where a is the acceleration onto the wall. A body that
     bounces keeps the slip during its flight of 2 e v_n/a.
     """
-    pull = start.moved(start.applied[None])[:, 0]
-    first: dict[int, tuple[float, int, float, float]] = {}  # tree -> time, contact, approach, acceleration
-    for rows in start.by_pair:
-        i = int(rows[0])
-        gap, approach = max(float(start.found.gap[i]), 0.0), -float(start.rows[i] @ start.v)
-        force, trees = -float(start.rows[i] @ pull), start.trees(i)
-        square = approach**2 + 2.0 * force * gap
-        if not all(start.is_free(tree) for tree in trees) or square < 0.0:
+    scene, found, first = start.scene, start.found, dict[int, tuple[float, int]]()  # tree -> time, contact
+    trees, held = start.mechanism.tree_of_body.tolist(), scene.hand.body if scene.hand is not None else ""
+    free = {tree for tree, body in zip(trees, scene.bodies, strict=True)
+            if trees.count(tree) == 1 and body.joint in ("planar", "free_flyer") and body.name != held}
+    for i in (int(rows[0]) for rows in start.by_pair):
+        both = {int(start.tree_a[i]), int(start.tree_b[i])}
+        for tree in both if both <= free else ():
+            first[tree] = min(first.get(tree, (math.inf, i)), (float(start.meeting[0][i]), i))
+    worst, said = SHIFTED, list[Caution]()
+    for time, i in sorted(first.values()):
+        if time >= scene.duration or start.friction[i] == 0.0:
             continue
-        speed = math.sqrt(square)
-        time = 2.0 * gap / (approach + speed) if approach + speed > 0.0 else 0.0 if gap == 0.0 else math.inf
-        for tree in trees:
-            first[tree] = min(first.get(tree, (math.inf, i, 0.0, 0.0)), (time, i, speed, force))
-    found = [(_shift(start, *one, pull), one) for one in first.values() if one[0] < start.scene.duration]
-    (share, change, slip), (_, i, speed, _) = max(found, default=((0.0, 0.0, 0.0), (0.0, 0, 0.0, 0.0)))
-    if share > SHIFTED:
-        both = start.names([i])
-        yield Caution("impact friction", both, f"{both} meet at {speed:.3g} m/s and slide at {slip:.3g} m/s, and "
-                      f"impacts of this law have no friction, which would take {change:.3g} m/s of it: use the world "
-                      "IAPB-friction or ideal-friction")
-
-
-def _shift(start: Start, time: float, i: int, speed: float, force: float, pull: Floats) -> tuple[float, float, float]:
-    """Return how friction in the impact at contact i changes path (over the thinner size) and slip, and the slip."""
-    mu, pair = float(start.friction[i]), np.array([[start.found.shape_a[i], start.found.shape_b[i]]])
-    e = float(restitution_by_pair(start.scene, pair)[0])
-    slip = float(np.linalg.norm([start._row(i, t) @ (start.v + time * pull) for t in _tangents(start, i)]))
-    change, left = min(mu * (1.0 + e) * speed, slip), start.scene.duration - time
-    if change == 0.0:
-        return 0.0, 0.0, slip
-    lasts = left if force <= 0.0 else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
-    return change * lasts / float(start.thickness[i]), change, slip
-
-
-def _thin_first(start: Start, i: int) -> tuple[int, int]:
-    a, b = int(start.found.shape_a[i]), int(start.found.shape_b[i])
-    return (a, b) if start.size[a] < start.size[b] else (b, a)
+        speed, mu, left = float(start.meeting[1][i]), float(start.friction[i]), scene.duration - time
+        e = float(restitution_by_pair(scene, np.array([[found.shape_a[i], found.shape_b[i]]]))[0])
+        slip = float(np.linalg.norm(start.slips(i) @ (start.v + time * start.fall)))
+        change, force = min(mu * (1.0 + e) * speed, slip), -float(start.pull[i])
+        lasts = left if force <= 0.0 else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
+        if change * lasts / float(start.thickness[i]) >= worst:
+            worst, names = change * lasts / float(start.thickness[i]), start.names([i])
+            said = [Caution("impact friction", names, f"{names} meet at {speed:.3g} m/s and slide at {slip:.3g} m/s, "
+                            f"and impacts of this law have no friction, which would take {change:.3g} m/s of it: use "
+                            "the world IAPB-friction or ideal-friction")]
+    yield from said
 
 
 def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
@@ -558,174 +447,149 @@ def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
     limits, contact = step_limits(start, integrator), start.scene.contact
     if limits is None or (contact.stiffness <= limits.stiffness and contact.damping <= limits.damping):
         return
-    many = f"{limits.contacts} contact{'s' * (limits.contacts > 1)}"
-    who = f"{limits.where} ({many}, effective mass {limits.mass:.3g} kg)"
-    remedy = f"or rate >= {_up(limits.rate)} Hz" if math.isfinite(limits.rate) else "or another integrator"
     by_damping = limits.damping > 0.0 and contact.damping * limits.stiffness > contact.stiffness * limits.damping
-    if limits.stiffness == 0.0 or by_damping:
-        yield Caution("damping", limits.where, f"contact.damping = {contact.damping:g} N s/m is more than a step of "
-                      f"{start.scene.rate:g} Hz can hold at {who}: set contact.damping <= "
-                      f"{_down(limits.damping)}, {remedy}")
-    else:
-        yield Caution("stiffness", limits.where, f"contact.stiffness = {contact.stiffness:g} N/m is more than a step "
-                      f"of {start.scene.rate:g} Hz can hold at {who}: set contact.stiffness <= "
-                      f"{_down(limits.stiffness)}, {remedy}")
+    field = "damping" if limits.stiffness == 0.0 or by_damping else "stiffness"
+    remedy = f"rate >= {_up(limits.rate):g} Hz" if math.isfinite(limits.rate) else "another integrator"
+    yield Caution(field, limits.where, f"contact.{field} = {getattr(contact, field):g} {_UNITS[field]} is more than a "
+                  f"step of {start.scene.rate:g} Hz can hold at {limits.where} ({limits.contacts} contact"
+                  f"{'s' * (limits.contacts > 1)}, effective mass {limits.mass:.3g} kg): set contact.{field} <= "
+                  f"{_down(getattr(limits, field)):g}, or {remedy}")
 
 
 def _sags(start: Start) -> Iterator[Caution]:
-    """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at a joint limit."""
-    K = start.scene.contact.stiffness
-    if K == 0.0:
-        return
-    worst: tuple[float, int] = (SAG, -1)
-    for rows in start.supports:
+    """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at a joint limit.
+
+    At a joint limit that does not touch, the force balances the load of its own joint, moved to the limit, as if the
+    joints behind it were fixed.
+    """
+    K, arrays, found = start.scene.contact.stiffness, start.mechanism.arrays, [(0.0, -1)]
+    for rows in start.supports if K > 0.0 else ():
         shares = start.loads(rows) / (K * start.thickness[rows])
-        worst = max(worst, (float(shares.max()), int(rows[shares.argmax()])))
-    share, i = max([worst, *((force / (K * start.thickness[i]), i) for i, force in start.at_stops.items())])
-    if i < 0:
+        found.append((float(shares.max()), int(rows[shares.argmax()])))
+    touching = {int(i) for rows in start.touching for i in rows}
+    for i, stop in enumerate(start.stops, len(start.rows) - len(start.stops)):
+        there = start.q.copy()
+        there[arrays.q_start[stop.body]] = stop.bound
+        load = -stop.sign * float(start.applied(there)[arrays.v_start[stop.body]]) / stop.arm
+        if K > 0.0 and i not in touching:
+            found.append((load / (K * float(start.thickness[i])), i))
+    share, i = max(found)
+    if share <= SAG:
         return
-    both, remedy = start.names([i]), f"set contact.stiffness >= {_up(K * share / SAG)}"
+    both = start.names([i])
+    says = f"{both} overlap by {in_metres(share * start.thickness[i])}, {share:.0%} of the thinner"
     if start.found.shape_a[i] == start.found.shape_b[i]:
-        yield Caution("sag", both, f"at rest the load on {both} holds its joint beyond it by {share:.3g} times its "
-                      f"range: {remedy}")
-    else:
-        yield Caution("sag", both, f"at rest {both} overlap by {in_metres(share * start.thickness[i])}, "
-                      f"{share:.0%} of the thinner: {remedy}")
+        says = f"the load on {both} holds its joint beyond it by {share:.3g} times its range"
+    yield Caution("sag", both, f"at rest {says}: set contact.stiffness >= {_up(K * share / SAG):g}")
 
 
 def _overdriven_friction(start: Start) -> Iterator[Caution]:
     """Warn where regularised friction (6), an explicit damper μN/v_thr, reverses a motion within a step."""
-    contact = start.scene.contact
-    if contact.friction_law != "regularised" or not start.friction.any():
-        return
-    worst, where = 2.0, np.zeros(0, np.int64)
-    for rows in start.supports:
-        force = start.loads(rows)
-        root = np.sqrt(start.friction[rows] * force * start.dt / contact.friction_velocity)
-        tangents = [(start._row(i, t), r) for i, r in zip(rows, root, strict=True) for t in _tangents(start, i)]
-        found = start.mobility(np.array([r * row for row, r in tangents]))
+    contact, worst, where = start.scene.contact, 2.0, ""
+    for rows in start.supports if contact.friction_law == "regularised" else ():
+        root = np.sqrt(start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity)
+        tangents = [r * row for i, r in zip(rows, root, strict=True) if r > 0.0 for row in start.slips(i)]
+        found = start.mobility(np.array(tangents))
         if found > worst * (1.0 + ROUNDED):
-            worst, where = found, rows
-    if len(where):
-        speed = contact.friction_velocity * worst / 2.0
-        yield Caution("friction", start.names(where), f"friction (6) at {start.names(where)} turns motion round within "
-                      f"a step, {0.5 * worst:.3g} times beyond its limit μ N Δt = 2 m v_threshold: set "
-                      f"contact.friction_velocity >= {_up(speed)}, or contact.friction_law: coulomb")
+            worst, where = found, start.names(rows)
+    if where:
+        yield Caution("friction", where, f"friction (6) at {where} turns motion round within a step, {0.5 * worst:.3g} "
+                      "times beyond its limit μ N Δt = 2 m v_threshold: set contact.friction_velocity >= "
+                      f"{_up(contact.friction_velocity * worst / 2.0):g}, or contact.friction_law: coulomb")
 
 
-def _tangents(start: Start, i: int) -> Floats:
-    axes = frame_along("normal", start.found.normal[i])
-    n = start.found.normal[i]
-    return axes[:, :2].T if start.spatial else np.array([[-n[1], n[0], 0.0]])
-
-
-def _down(x: float, digits: int = 2) -> str:
+def _down(x: float) -> float:
     """Return x rounded down to two digits."""
-    return f"{_two_digits(x, math.floor, digits):g}"
+    return _two_digits(x, math.floor, 1.0 + ROUNDED)
 
 
-def _up(x: float, digits: int = 2) -> str:
+def _up(x: float) -> float:
     """Return x rounded up to two digits."""
-    return f"{_two_digits(x, math.ceil, digits):g}"
+    return _two_digits(x, math.ceil, 1.0 - ROUNDED)
 
 
-def _two_digits(x: float, way: Any, digits: int = 2) -> float:
+def _two_digits(x: float, way: Callable[[float], int], slack: float) -> float:
     if not (0.0 < x < math.inf):
         return x
-    power = math.floor(math.log10(x)) - digits + 1
-    slack = 1.0 + ROUNDED if way is math.floor else 1.0 - ROUNDED
+    power = math.floor(math.log10(x)) - 1
     return float(f"{way(x * slack / 10.0**power)}e{power}")
 
 
-# What `contact.auto` chooses
+# What `contact.auto` and `contact.forces: implicit` choose
 
 AUTO_K, AUTO_B = 0.2, 0.5  # k and b at the most critical contacts: k + 2 b = 1.2 is far below 4
 SPARE = 2.0  # factor by which later contacts may be lighter than those at the start
+SAG_ALLOWED, SAG_SHARE = 1e-4, 1e-3  # m, and share of the smallest shape: largest static sag of implicit contact
+SPARE_LOAD = 10.0  # times the weight of everything that moves: levers and wedges can press harder
+RELAXATION = 0.01  # s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
+STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
+_UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
 
 
-def settled(scene: Scene, start: Start | None = None) -> tuple[Scene, tuple[str, ...]]:
+def settled(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with the values that `contact.auto` and `contact.resting_start` choose, and remarks on them.
 
     A scene that uses neither is returned unchanged.
     """
     said: tuple[str, ...] = ()
     if scene.contact.auto:
-        scene, said = _chosen(scene, Start(scene) if start is None else start)
+        choice, said = _chosen(Start(scene))
+        scene = scene.with_values({"contact.auto": False} | {f"contact.{name}": x for name, x in choice.items()})
     elif scene.chosen_fields:
-        choice, sentence = _firm(scene)
-        scene, said = scene.model_copy(update={"contact": scene.contact.choosing(choice)}), (sentence,)
+        choice, said = _firm(scene)
+        scene = scene.model_copy(update={"contact": scene.contact.choosing(choice)})
     return _at_rest(scene, said) if scene.contact.resting_start else (scene, said)
 
 
-SAG_ALLOWED, SAG_SHARE = 1e-4, 1e-3  # m, and share of the smallest shape: largest static sag of implicit contact
-SPARE_LOAD = 10.0  # times the weight of everything that moves: levers and wedges can press harder
-RELAXATION = 0.01  # s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
-STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
-
-
-def _firm(scene: Scene) -> tuple[dict[str, float], str]:
+def _firm(scene: Scene) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return stiffness and damping of implicit contact that are not given, and a sentence on them.
 
     The stiffness holds ten times the weight of all bodies, and the hand's force, at the sag allowed.
     """
-    shapes = shapes_of(scene)
-    sizes = [_smallest_extent(shapes, i) for i in range(len(shapes.kind))]
-    sag = min(SAG_ALLOWED, SAG_SHARE * min([size for size in sizes if math.isfinite(size)], default=1.0))
-    mass = sum(body.mass for body in scene.bodies)
-    load = mass * max(STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,))))
+    sag = min([SAG_ALLOWED, *(SAG_SHARE * solid.thin for solid in solids_of(shapes_of(scene)).values())])
+    load = sum(body.mass for body in scene.bodies) * max(STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,))))
     load += scene.hand.largest_force() if scene.hand is not None and not scene.hand.force_function else 0.0
-    choice: dict[str, float] = {}
+    K, choice = scene.contact.stiffness, dict[str, float]()
     if "stiffness" in scene.chosen_fields:
-        choice["stiffness"] = min(_two_digits(SPARE_LOAD * load / sag, math.ceil), LARGEST_NUMBER)
+        choice["stiffness"] = K = min(_up(SPARE_LOAD * load / sag), LARGEST_NUMBER)
     if "damping" in scene.chosen_fields:
-        stiffness = choice.get("stiffness", scene.contact.stiffness)
-        choice["damping"] = min(_two_digits(stiffness * RELAXATION, math.ceil), LARGEST_NUMBER)
-    values = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
-    K = choice.get("stiffness", scene.contact.stiffness)
+        choice["damping"] = min(_up(K * RELAXATION), LARGEST_NUMBER)
     sags = f"; a load of {load:.3g} N sags by {in_metres(load / K)}" if K > 0.0 else ""
-    return choice, f"chosen for implicit contact: {values}{sags}"
+    return choice, (f"chosen for implicit contact: {_listed(choice)}{sags}",)
 
 
-def _chosen(scene: Scene, start: Start) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with the values that `contact.auto` chooses, and a remark."""
-    dt, given = start.dt, scene.contact.model_fields_set
-    choice: dict[str, float] = {}
-    said = who = ""
-    if scene.contact.forces == "implicit":
-        choice, said = _firm(scene)
-        given = given | {"stiffness", "damping"}
+def _listed(choice: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
+
+
+def _chosen(start: Start) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the values that `contact.auto` chooses, and a remark."""
+    scene, dt, choice, said = start.scene, start.dt, dict[str, float](), tuple[str, ...]()
+    given = scene.contact.model_fields_set
     mobility, rows = start.critical[0]
+    who = start.names(rows)
     mobility *= SPARE if len(start.blocks) > 1 else 1.0
     if mobility == 0.0:  # nothing is near enough to know what will touch: as if the lightest body did
         mobility = SPARE * max((1.0 / body.mass for body in scene.bodies if body.mass > 0.0), default=0.0)
         who = "the lightest body"
     if mobility == 0.0 or not len(start.rows) and not len(start.pairs):
-        return scene.with_values({"contact.auto": False}), ()
+        return {}, ()
+    if scene.contact.forces == "implicit":
+        choice, said = _firm(scene)
+        given = given | {"stiffness", "damping"}
     if "stiffness" not in given:
-        choice["stiffness"] = _two_digits(AUTO_K / (mobility * dt**2), math.floor)
+        choice["stiffness"] = _down(AUTO_K / (mobility * dt**2))
     if "damping" not in given:
         K = choice.get("stiffness", scene.contact.stiffness)
         most = AUTO_B * min(1.0, math.sqrt(K * mobility * dt**2 / AUTO_K))  # softer springs want less
-        choice["damping"] = _two_digits(most / (mobility * dt), math.floor)
-    if "coherence_distance" not in given:
-        choice["coherence_distance"] = _two_digits(2.0 * _top_speed(start) * dt, math.ceil)
+        choice["damping"] = _down(most / (mobility * dt))
+    if "coherence_distance" not in given:  # twice what the fastest contact point moves in a step, after a fall or push
+        length = float(np.ptp(start.found.point, axis=0).max()) if len(start.rows) else 0.0
+        speed, push = (float(np.abs(each).max(initial=0.0)) for each in (start.rows @ start.v, start.pull))
+        choice["coherence_distance"] = _up(2.0 * math.sqrt(speed**2 + 2.0 * push * length) * dt)
     choice = {name: min(value, LARGEST_NUMBER) for name, value in choice.items()}
-    if not said:
-        values = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
-        said = (f"contact.auto chose {values}: effective mass {1.0 / mobility:.3g} kg at "
-                f"{who or start.names(rows)}, {scene.rate:g} Hz")
-    return scene.with_values({"contact.auto": False} | {f"contact.{name}": x for name, x in choice.items()}), (said,)
-
-
-_UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
-
-
-def _top_speed(start: Start) -> float:
-    """Return the largest speed [m/s] of a contact point, from the start and a fall or push over the scene's length."""
-    length = float(np.ptp(start.found.point, axis=0).max()) if len(start.found.gap) else 0.0
-    push = np.abs(start.rows @ start.moved(start.applied[None])[:, 0]).max(initial=0.0)
-    speed = np.abs(start.rows @ start.v).max(initial=0.0)
-    return float(math.sqrt(speed**2 + 2.0 * push * length))
+    return choice, said or (f"contact.auto chose {_listed(choice)}: effective mass {1.0 / mobility:.3g} kg at {who}, "
+                            f"{scene.rate:g} Hz",)
 
 
 # What `contact.resting_start` chooses
@@ -738,15 +602,17 @@ DIGITS = 10  # of positions in m and rad, so that rounding in linear algebra has
 def _at_rest(scene: Scene, said: tuple[str, ...]) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with touching bodies moved to the equilibrium of springs and sticking friction, and remarks."""
     scene = settling = scene.with_values({"contact.resting_start": False})
+    why = "no equilibrium was found"
     for _ in range(SETTLING):
         found = _sunk(Start(settling))
-        if isinstance(found, str):
-            return scene, (*said, f"contact.resting_start: left as given, for {found}")
         if not found:
             moved = float(np.abs(start_of(settling)[0] - start_of(scene)[0]).max())
             return settling, (*said, f"contact.resting_start moved what touches by up to {moved:.3g} m, rad")
+        if isinstance(found, str):
+            why = found
+            break
         settling = settling.with_values(found)
-    return scene, (*said, "contact.resting_start: left as given, for no equilibrium was found")
+    return scene, (*said, f"contact.resting_start: left as given, for {why}")
 
 
 def _sunk(start: Start) -> dict[str, Any] | str:
@@ -758,15 +624,14 @@ def _sunk(start: Start) -> dict[str, Any] | str:
     """
     if not start.touching or start.scene.contact.stiffness == 0.0:
         return "nothing touches, or no spring holds it"
-    rows, K = np.concatenate(start.touching), start.scene.contact.stiffness
-    trees = list({tree for i in rows for tree in start.trees(i)})
-    ours = np.isin(start.mechanism.tree_of_body[start.mechanism.arrays.dof_body], trees)
+    rows, K, trees = np.concatenate(start.touching), start.scene.contact.stiffness, start.mechanism.tree_of_body
+    members = np.isin(trees, [start.tree_a[rows], start.tree_b[rows]])
+    ours = members[start.mechanism.arrays.dof_body]
     if start.v[ours].any() or (start.found.shape_a[rows] == start.found.shape_b[rows]).any():
         return "what touches moves, or is a joint at its limit"
-    J, g, f = start.rows[rows][:, ours], start.found.gap[rows], start.applied[ours]
-    tangents = [start._row(i, t) for i in rows if start.friction[i] > 0.0 for t in _tangents(start, i)]
-    T = np.array(tangents).reshape(-1, start.mechanism.nv)[:, ours]
-    scale = np.concatenate([np.full(J.shape[1], 1.0 / math.sqrt(K)), np.full(len(T), math.sqrt(K))])
+    J, g, f = start.rows[rows][:, ours], start.found.gap[rows], start.applied(start.q)[ours]
+    T = np.concatenate([start.rows[:0], *(start.slips(i) for i in rows if start.friction[i] > 0.0)])[:, ours]
+    scale = np.repeat([1.0 / math.sqrt(K), math.sqrt(K)], [J.shape[1], len(T)])
     held = np.hstack([K * J.T @ J, T.T])
     solved = scale * np.linalg.lstsq(held * scale, f - K * J.T @ g, rcond=1e-9)[0]
     delta, friction = solved[: J.shape[1]], solved[J.shape[1] :]
@@ -781,4 +646,4 @@ def _sunk(start: Start) -> dict[str, Any] | str:
     moved[ours] = delta
     q, first = start.mechanism.integrate(start.q, moved, 1.0), start.mechanism.arrays.q_start
     return {f"bodies.{body.name}.position": q[first[b] : first[b] + len(body.position)].round(DIGITS).tolist()
-            for b, body in enumerate(start.scene.bodies) if start.mechanism.tree_of_body[b] in trees}
+            for b, body in enumerate(start.scene.bodies) if members[b]}

@@ -1,0 +1,61 @@
+"""Shapes as points and half-spaces, for the questions that advice asks: how thin, how high above, passed through."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.contact.geometry import ENDLESS, Shapes
+
+Floats = NDArray[np.float64]
+
+GRAZED = 0.1  # of a shape's thickness: a path that enters it by less does not pass through it
+
+
+class Solid(NamedTuple):
+    """A convex shape in the frame of its body (-1: the world): a ball or circle, or what faces n·x <= offset bound."""
+
+    body: int
+    points: Floats  # (p, 3) its centre, then its corners
+    normals: Floats  # (e, 3) unit, outward; none for a ball
+    offsets: Floats  # (e,)
+    radius: float
+    thin: float  # smallest extent
+    reach: float  # greatest distance from the body's origin, or from the wall's centre
+
+    @classmethod
+    def of(cls, shapes: Shapes, i: int) -> Solid:
+        """Return shape number i of a scene, which must not be endless."""
+        body, radius, none = int(shapes.body[i]), float(shapes.radius[i]), np.zeros(0)
+        corners = np.pad(shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]], ((0, 0), (0, 1)))
+        centre = corners.mean(axis=0) if len(corners) else shapes.center[i]
+        middle = centre if body < 0 else np.zeros(3)
+        if radius > 0.0:
+            far = radius + float(np.linalg.norm(centre - middle))
+            return cls(body, centre[None], none.reshape(0, 3), none, radius, 2.0 * radius, far)
+        if len(corners):
+            edges = np.roll(corners, -1, axis=0) - corners
+            normals = np.cross(edges, [0.0, 0.0, 1.0]) / np.linalg.norm(edges, axis=1)[:, None]
+        else:
+            signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+            corners = centre + (signs * shapes.half_size[i]) @ shapes.axes[i].T
+            normals = np.vstack([shapes.axes[i].T, -shapes.axes[i].T])
+        points = np.vstack([centre, corners])
+        over, far = points @ normals.T, float(np.linalg.norm(points - middle, axis=1).max())
+        return cls(body, points, normals, over.max(axis=0), 0.0, float(np.ptp(over, axis=0).min()), far)
+
+
+def solids_of(shapes: Shapes) -> dict[int, Solid]:
+    """Return the solid of each shape that is not endless."""
+    return {i: Solid.of(shapes, i) for i in np.flatnonzero(~np.isin(shapes.kind, ENDLESS)).tolist()}
+
+
+def joined(count: int, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+    """Return a number for each of `count` things; things that pairs connect have the same one."""
+    group = np.arange(count)
+    for a, b in pairs:
+        group[group == group[b]] = group[a]
+    return group
