@@ -6,6 +6,9 @@ runtime, so a kernel that would allocate does not compile. The compiler thus che
 `block` passes a NamedTuple of arrays, also a nested one, to kernels as one pointer. Numba passes a tuple member by
 member, some 1,300 numbers for a whole world; a step then took 150 s to compile and 60 µs to run. With a pointer it
 takes a tenth of the compile time and a hundredth of the run time. In Python a block has the attributes of its tuple.
+
+Only what a scene calls for is compiled: a flag that is off (`flag`) is part of a block's type, and kernels that need it
+are replaced by a constant. `IAPB_COMPILE=whole` compiles everything once for all scenes, which many scenes share.
 """
 
 from __future__ import annotations
@@ -13,11 +16,12 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import inspect
+import os
 import struct
 import warnings
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -69,11 +73,40 @@ def _stamp_of(function: Callable[..., Any]) -> str:
     return hashlib.sha256(_STAMP.encode() + path.read_bytes()).hexdigest()
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function as a kernel (see the module's docstring), cached until a file with kernels changes."""
+class Absent:
+    """A flag that is off, whose kernels are not compiled; false."""
+
+    def __bool__(self) -> bool:
+        return False
+
+    def __int__(self) -> int:
+        return 0
+
+
+ABSENT = Absent()
+
+
+def flag(on: bool) -> Any:
+    """Return the value of a flag in a block; kernels that need a flag which is off are not compiled."""
+    return True if on else False if os.environ.get("IAPB_COMPILE") == "whole" else ABSENT
+
+
+def kernel(function: Callable[..., Any] | None = None, *, needs: str = "", otherwise: Any = None) -> Any:
+    """Compile a function as a kernel (see the module's docstring), cached until a file with kernels changes.
+
+    needs : flags (see `flag`), separated by blanks; if all are off in a block among the arguments, kernels that call
+        this one get the constant `otherwise` in its place
+    """
+    if function is None:
+        return partial(kernel, needs=needs, otherwise=otherwise)
     if config.DISABLE_JIT:
         return function
-    compiled = compile_as_whole(function, fastmath=False, _nrt=False)
+    flags = frozenset(needs.split())
+
+    def is_absent(kinds: Sequence[types.Type]) -> bool:
+        return bool(flags) and any(isinstance(kind, BlockType) and flags <= kind.absent for kind in kinds)
+
+    compiled = compile_as_whole(function, is_absent, otherwise, fastmath=False, _nrt=False)
     try:
         compiled.enable_caching()
     except RuntimeError:  # no cache folder is writable, for example in a system-wide installation
@@ -118,8 +151,15 @@ def copy_into(target, source):
         target[k] = source[k]
 
 
+class AbsentType(types.Boolean):
+    """Type of a flag that is off."""
+
+
+_ABSENT_TYPE = AbsentType("absent")
+
+
 class BlockType(types.Type):
-    """Numba's type of a block: its fields, each with its type and its place (in words of 8 bytes)."""
+    """Numba's type of a block: its fields, each with its type and its place (in words of 8 bytes); its absent flags."""
 
     def __init__(self, name: str, fields: tuple[tuple[str, types.Type], ...]) -> None:
         self.fields = fields
@@ -128,6 +168,8 @@ class BlockType(types.Type):
             places.append(words)
             words += _words(kind)
         self.places = tuple(places)
+        self.absent = frozenset(field for field, kind in fields if isinstance(kind, AbsentType)).union(
+            *(kind.absent for _, kind in fields if isinstance(kind, BlockType)))
         super().__init__(f"{name}({', '.join(f'{field}: {kind}' for field, kind in fields)})")
 
     def find(self, name: str) -> tuple[types.Type, int]:
@@ -332,6 +374,8 @@ def _kind(value: Any) -> types.Type:
         return value.block_type
     if type(value) in _NUMBERS:
         return _NUMBERS[type(value)]
+    if value is ABSENT:
+        return _ABSENT_TYPE
     return types.boolean if isinstance(value, np.bool_) else typeof(value)
 
 
@@ -396,7 +440,8 @@ class _BlockAttributes(AttributeTemplate):
     key = BlockType
 
     def generic_resolve(self, kind: BlockType, name: str) -> types.Type | None:
-        return dict(kind.fields).get(name)
+        found = dict(kind.fields).get(name)
+        return types.boolean if isinstance(found, AbsentType) else found
 
 
 @lower_getattr_generic(BlockType)
@@ -404,6 +449,8 @@ def _read_field(context: Any, builder: Any, kind: BlockType, value: Any, name: s
     """Load a field: an array structure, a nested block's address, or a number."""
     field, place = kind.find(name)
     word = builder.gep(value, [ir.Constant(ir.IntType(64), place)], inbounds=True)
+    if isinstance(field, AbsentType):
+        return context.get_constant(types.boolean, False)
     if isinstance(field, types.Boolean):
         result = builder.icmp_unsigned("!=", builder.load(word), ir.Constant(ir.IntType(64), 0))
     else:

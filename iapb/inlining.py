@@ -9,6 +9,7 @@ from a block: a step of the resting peg takes 0.6 times as long.
 
 from __future__ import annotations
 
+import inspect
 from functools import cached_property
 from typing import Any
 
@@ -122,20 +123,34 @@ class WholeCompiler(_Compiler):
     lowering = WholeLowering
 
 
-def compile_as_whole(function: Any, **options: Any) -> Any:
-    """Compile a function as numba's `njit` does, with one version for Python and one for kernels that call it."""
-    compiled = jit(nopython=True, pipeline_class=WholeCompiler, **options)(function)
-    inner = jit(nopython=True, pipeline_class=BitcodeCompiler, no_cpython_wrapper=True, no_cfunc_wrapper=True,
-                **options)(function)
+def compile_as_whole(function: Any, is_absent: Any, otherwise: Any, **options: Any) -> Any:
+    """Compile a function as numba's `njit` does, with one version for Python and one for kernels that call it.
 
-    def add_overload(result: Any) -> None:
-        inner.overloads[tuple(result.signature.args)] = result
+    For argument types with is_absent(types), kernels get a third version, which returns the constant `otherwise`.
+    """
+    compiled = jit(nopython=True, pipeline_class=WholeCompiler, **options)(function)
+
+    def bitcode_of(python: Any) -> Any:
+        made = jit(nopython=True, pipeline_class=BitcodeCompiler, no_cpython_wrapper=True, no_cfunc_wrapper=True,
+                   **options)(python)
+
+        def add_overload(result: Any) -> None:
+            made.overloads[tuple(result.signature.args)] = result
+
+        made.add_overload = add_overload  # Python never calls it, so it needs no machine code by argument types
+        return made
+
+    parameters = ", ".join(inspect.signature(function).parameters)
+    inner, constant = bitcode_of(function), bitcode_of(eval(f"lambda {parameters}: {otherwise!r}"))
+
+    def version(arguments: Any) -> Any:
+        return constant if is_absent(arguments) else inner
 
     def get_call_template(arguments: Any, keywords: Any) -> Any:
         """Use one version for all constant arguments: the optimiser sees the constants when it inlines."""
-        return inner.get_call_template(tuple(types.unliteral(kind) for kind in arguments), keywords)
+        plain = tuple(types.unliteral(kind) for kind in arguments)
+        return version(plain).get_call_template(plain, keywords)
 
-    inner.add_overload = add_overload  # Python never calls it, so it needs no machine code by argument types
     compiled.get_call_template = get_call_template
-    compiled.get_overload = inner.get_overload
+    compiled.get_overload = lambda arguments: version(arguments).get_overload(arguments)
     return compiled

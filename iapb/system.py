@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.advice.checks import settled
 from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, count_pairs, decide_for
-from iapb.compiled import Entry, block, columns
+from iapb.compiled import Entry, block, columns, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.kernels.coulomb import make_step_friction
@@ -52,6 +52,9 @@ from iapb.scene.mechanism import (
 Floats = NDArray[np.float64]
 
 _factored = Entry(cholesky)
+
+# Effects whose kernels are compiled only where they are on.
+_COMPILED = ("impact_friction", "unequal_restitution", "joint_damping")
 
 
 class Parts:
@@ -300,8 +303,9 @@ def make_world(system: System, law: Any, effects: Sequence[Effect]) -> World:
     if scaled:
         limit[slice(*system.tool_dofs)] = _force_limit(scene)
     switches = Switches(
-        **{name: name in on for name in Switches._fields if name in EFFECT_NAMES},
-        pushing=law.impulses and law.pushing,
+        **{name: flag(name in on) if name in _COMPILED else name in on
+           for name in Switches._fields if name in EFFECT_NAMES},
+        pushing=flag(law.impulses and law.pushing),
         impulse_limit=scaled,
         spreading=scaled and law.rendering == "spread",
         contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions", "joint_limits")),
@@ -315,8 +319,8 @@ def make_world(system: System, law: Any, effects: Sequence[Effect]) -> World:
         dt=system.dt, gravity=system.gravity,
         stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
         friction_class=system.frictions.class_of_shape, friction=system.frictions.table,
-        coulomb="friction" in on and (contact.friction_law == "coulomb" or contact.forces == "implicit"),
-        implicit=contact.forces == "implicit", tangents=2 if isinstance(scene, SpatialScene) else 1,
+        coulomb=flag("friction" in on and (contact.friction_law == "coulomb" or contact.forces == "implicit")),
+        implicit=flag(contact.forces == "implicit"), tangents=2 if isinstance(scene, SpatialScene) else 1,
         friction_velocity=float(contact.friction_velocity),
         restitution=float(system.restitutions[0] if len(system.restitutions) == 1 else contact.restitution),
         approach_velocity=float(contact.approach_velocity),
@@ -404,7 +408,8 @@ def _make_port(system: System, coupling: Coupling, on: frozenset[str], external:
     tool_zeros: dict[str, Any] = {name: np.zeros(v_stop - v_start) for name in (
         "device_hand_force", "device_force", "pulse_force", "error", "acceleration", "measured_v")}
     return block(Port(
-        coupling=coupling.kind, tool_tree=system.tool_tree, q_start=q_start, q_stop=q_stop, v_start=v_start,
+        coupling=coupling.kind, device=flag(not isinstance(coupling, NoCoupling)), tool_tree=system.tool_tree,
+        q_start=q_start, q_stop=q_stop, v_start=v_start,
         v_stop=v_stop, mechanism=device.block, body=device.workspace(),
         varying_inertia=not device.has_constant_mass_matrix,
         free=block(make_free_motion(device.arrays, device.tree_of_body)),

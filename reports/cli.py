@@ -41,6 +41,9 @@ COMMANDS = {
 }  # fmt: skip
 
 
+# Many scenes share kernels compiled whole (see `iapb.compiled`); other commands compile what one scene needs.
+MANY_SCENES = ("verify", "bench", "sweep", "store", "reproduce")
+
 COMPLETION = "_IAPB_COMPLETE"  # set while a shell asks for completions
 
 
@@ -75,6 +78,8 @@ def _app(given: list[str]) -> typer.Typer:
     if COMPLETION in os.environ:  # shell completion: the shell passes the words in a variable
         given = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
     wanted = next((word for word in given if not word.startswith("-")), "")
+    if wanted in MANY_SCENES:
+        os.environ.setdefault("IAPB_COMPILE", "whole")
     for name, words in COMMANDS.items():
         command = getattr(import_module(f"reports.commands.{name}"), name) if name == wanted else _not_given
         app.command(name, help=None if name == wanted else words)(_abortable(command))

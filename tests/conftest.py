@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 
+os.environ.setdefault("IAPB_COMPILE", "whole")  # many scenes share one set of kernels; a test of its own compiles less
+
 import numpy as np
 from hypothesis import HealthCheck, settings
 from numba.core import config

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.compiled import flag
 from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
 from iapb.linalg import product
@@ -52,6 +53,7 @@ class Shapes(NamedTuple):
     center: Floats  # (n, 3) [m] of a sphere or box, point of a half-space; planar shapes: 0
     axes: Floats  # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
     half_size: Floats  # (n, 3) [m] of a box, along its axes
+    space: Any  # whether they are shapes in space (`iapb.compiled.flag`)
 
 
 class ContactBuffer(NamedTuple):
@@ -139,6 +141,7 @@ def make_shapes(descriptions: Sequence[Shape]) -> Shapes:
         center=np.zeros((n, 3)),
         axes=np.tile(np.eye(3), (n, 1, 1)),
         half_size=np.zeros((n, 3)),
+        space=flag(False),
     )
 
 
@@ -310,6 +313,7 @@ def make_spatial_shapes(descriptions: Sequence[SpatialShape]) -> Shapes:
         center=np.array([row[1] for row in rows], np.float64).reshape(n, 3),
         axes=np.ascontiguousarray(np.array([row[2] for row in rows], np.float64).reshape(n, 3, 3)),
         half_size=np.array([row[3] for row in rows], np.float64).reshape(n, 3),
+        space=flag(True),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class Port(NamedTuple):
     """Hand, coupling and device of one world; d velocities of the world, d_t of the tool and the device."""
 
     coupling: int  # NO_COUPLING, FOUR_CHANNEL, UNILATERAL
+    device: Any  # whether there is one (`iapb.compiled.flag`)
     tool_tree: int  # -1: no tool is held
     q_start: int  # the tool's range in q
     q_stop: int
@@ -79,7 +80,7 @@ class Port(NamedTuple):
 # Measurement of the device: quantised sensors and delay.
 
 
-@kernel
+@kernel(needs="device")
 def measure(world, port):
     """Write the state of the device as the simulation reads it: quantised by the sensors, and delayed."""
     slots = port.delayed_q.shape[0]
@@ -178,7 +179,7 @@ def press(mechanism, body, held, port, out):
         k = mechanism.dof_parent[k]
 
 
-@kernel
+@kernel(needs="device")
 def coordinate(state, port):
     """Write the PD force of the position channels on the tool; its opposite acts on the device."""
     port.coupling_force[:] = 0.0
@@ -195,7 +196,7 @@ def coordinate(state, port):
 # Rendering of an impulse over several steps, and the passivity observer that prevents an energy gain.
 
 
-@kernel
+@kernel(needs="device")
 def shape_impulse(world, state, port):
     """Spread the step's impulse by the waveform's weights; render the share due now in place of the whole impulse.
 
@@ -265,7 +266,7 @@ def render(world, state, port):
     command(port)
 
 
-@kernel
+@kernel(needs="device")
 def command(port):
     """Write the actuator force: F_env (four-channel only) minus the PD, clipped to the device's limits and delayed."""
     slots = port.delayed_force.shape[0]
@@ -280,7 +281,7 @@ def command(port):
         port.device_force[i] = port.delayed_force[(port.clock[0] + 1) % slots, i]
 
 
-@kernel
+@kernel(needs="device", otherwise=True)
 def move_device(world, state, port):
     """Integrate M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the motion diverged.
 

@@ -6,6 +6,7 @@ from math import sqrt
 
 import numpy as np
 
+from iapb.compiled import flag
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
 from iapb.mechanics.kernels.arrays import MechanismArrays
 from iapb.mechanics.kernels.free_motion import LINKAGE, RIGID, STRAIGHT, FreeMotion
@@ -38,7 +39,8 @@ def make_free_motion(m: MechanismArrays, tree_of_body: np.ndarray) -> FreeMotion
                 carried |= {b} if m.parent[b] in carried else set()
             if kind in (FREE_FLYER, PLANAR, SPHERICAL) and carried.issuperset(moving):
                 found.base[t] = m.v_count[root]
-    return found._replace(turning=bool((found.kind != STRAIGHT).any()), linked=bool((found.kind == LINKAGE).any()))
+    return found._replace(turning=flag(bool((found.kind != STRAIGHT).any())),
+                          linked=flag(bool((found.kind == LINKAGE).any())))
 
 
 def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ import importlib.util
 import math
 import pickle
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -18,7 +18,17 @@ from numba import njit
 from numba.core.errors import NumbaError
 
 import iapb.run
-from iapb.compiled import _STAMP, Block, _source_stamp, _stamped_files, address_of, block, copy_into, kernel
+from iapb.compiled import (
+    _STAMP,
+    Block,
+    _source_stamp,
+    _stamped_files,
+    address_of,
+    block,
+    copy_into,
+    flag,
+    kernel,
+)
 
 ENGINE = Path(iapb.run.__file__).parent
 
@@ -336,3 +346,26 @@ def test_the_address_of_an_array_is_that_of_its_first_entry() -> None:
     fixed.setflags(write=False)
     for array in (whole, whole[1:], whole[:, 1:], whole.T, fixed, np.zeros((0, 3)), np.zeros((2, 0)), np.ones(3, bool)):
         assert address_of(array) == array.__array_interface__["data"][0]
+
+
+class Flags(NamedTuple):
+    first: Any
+    second: Any
+
+
+@kernel(needs="first second", otherwise=-1)
+def needing(flags, x):
+    return x
+
+
+@kernel
+def calling(flags, x):
+    return needing(flags, x) + (10 if flags.first else 0)
+
+
+@pytest.mark.parametrize("how", ["lean", "whole"])
+def test_a_kernel_whose_flags_are_all_off_is_not_compiled(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IAPB_COMPILE", how)
+    found = {(a, b): calling(block(Flags(flag(a), flag(b))), 3) for a in (False, True) for b in (False, True)}
+    off = -1 if how == "lean" else 3
+    assert found == {(False, False): off, (False, True): 3, (True, False): 13, (True, True): 13}

@@ -10,12 +10,12 @@ The pairs keep the order of the candidate pairs, so a scene gives the same bits 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.compiled import kernel
+from iapb.compiled import flag, kernel
 from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE, POLYGON, SPHERE, Integers, Shapes
 
 # Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant pairs early.
@@ -44,6 +44,7 @@ class BroadPhase(NamedTuple):
     sorted: NDArray[np.int64]  # (k,)
     key: NDArray[np.int64]  # (capacity,)
     pairs: Integers  # (capacity, 2) output
+    used: Any  # `iapb.compiled.flag`
 
 
 def make_broad_phase(shapes: Shapes, pairs: Integers) -> BroadPhase:
@@ -65,7 +66,7 @@ def make_broad_phase(shapes: Shapes, pairs: Integers) -> BroadPhase:
         moving=moving, static=static, body=shapes.body[:n].copy(), allowed=allowed, local_center=local,
         radius=radius, cell_size=float(2.0 * radius[moving].max(initial=0.0)) or 1.0, center=local.copy(),
         neighbours=27 if np.any(shapes.kind >= HALF_SPACE) else 9,
-        cell=np.zeros((k, 3), np.int64), pairs=np.zeros((capacity, 2), np.int32), **wholes,
+        cell=np.zeros((k, 3), np.int64), pairs=np.zeros((capacity, 2), np.int32), used=flag(len(pairs) > 0), **wholes,
     )
 
 
@@ -86,7 +87,7 @@ def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Floats, float]:
 LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cell and its neighbours
 
 
-@kernel
+@kernel(needs="used", otherwise=0)
 def near_pairs(broad, R, p, margin):
     """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do not fit."""
     place_bounds(broad, R, p)

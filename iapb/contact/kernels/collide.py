@@ -173,7 +173,7 @@ def log_impact(state, island, rows, rank, share, clamp, friction_share, solved, 
     log.logged[0] = n + 1
 
 
-@kernel
+@kernel(needs="unequal_restitution pushing", otherwise=(0, 1.0, False))
 def resolve_unequal(world, state, size, count, smallest):
     """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e, which is passive."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
@@ -187,7 +187,7 @@ def resolve_unequal(world, state, size, count, smallest):
     return rank, clamp, False
 
 
-@kernel
+@kernel(needs="impact_friction", otherwise=(1.0, 1.0, True))
 def add_friction_to_impact(world, state, size, count, rank):
     """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
     gather_tangents(world, state, size, count)

@@ -57,7 +57,7 @@ def remember_friction(state):
         store(state.previous.friction_force, i, load(state.contacts.friction_force, i))
 
 
-@kernel
+@kernel(needs="coulomb")
 def add_step_friction(world, state):
     """Add the friction of the step to v; write friction_force (d,) and that of each contact.
 

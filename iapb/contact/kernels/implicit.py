@@ -75,7 +75,7 @@ def make_rest_work(coordinates: int, contacts: int, rows: int, tree_size: int, t
                     **{name: np.zeros(size) for name, size in vectors.items()})
 
 
-@kernel
+@kernel(needs="implicit")
 def rest_implicitly(world, state, rubs):
     """Give v the forces of all resting contacts; write them to the contacts, to penalty_force and friction_force."""
     if not list_groups(world, state):

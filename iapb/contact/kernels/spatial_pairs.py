@@ -20,7 +20,7 @@ from iapb.contact.kernels.shape_frames import (
 from iapb.linalg import add, cross, dot, load, scale, subtract
 
 
-@kernel
+@kernel(needs="space", otherwise=0)
 def spatial_pair(shapes, a, b, R, p, margin, buffer, count):
     """Write the contacts of two spatial shapes; a half-space is always b."""
     kind_a, kind_b = shapes.kind[a], shapes.kind[b]

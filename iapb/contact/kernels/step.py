@@ -240,7 +240,7 @@ def drift(world, state):
     return True
 
 
-@kernel
+@kernel(needs="linked")
 def coriolis(world, state):
     """acceleration <- −M⁻¹ B at the present state."""
     bias(world.mechanism, state.body, state.v, state.bias)
@@ -249,7 +249,7 @@ def coriolis(world, state):
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.acceleration, state.acceleration)
 
 
-@kernel
+@kernel(needs="linked", otherwise=True)
 def swing(world, state, h):
     """Move the linkages by h [s]: velocity Verlet, then the root's momentum and the energy are those before."""
     m, free, a = world.mechanism, world.free, state.acceleration
@@ -311,7 +311,7 @@ def pull_free_trees(world, state):
                 state.v[k] -= 0.5 * world.dt * state.bias[k]
 
 
-@kernel
+@kernel(needs="joint_damping", otherwise=True)
 def damp_joints(world, state):
     """Solve (M + Δt D) v⁺ = M v for damped trees, D diagonal; −D v⁺ into `acceleration`. False: not definite.
 
