@@ -168,7 +168,7 @@ class BlockType(types.Type):
             places.append(words)
             words += _words(kind)
         self.places = tuple(places)
-        self.absent = frozenset(field for field, kind in fields if isinstance(kind, AbsentType)).union(
+        self.absent: frozenset[str] = frozenset(field for field, kind in fields if isinstance(kind, AbsentType)).union(
             *(kind.absent for _, kind in fields if isinstance(kind, BlockType)))
         super().__init__(f"{name}({', '.join(f'{field}: {kind}' for field, kind in fields)})")
 
