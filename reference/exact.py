@@ -1,4 +1,4 @@
-"""Exact results for hard impacts: rational numbers, and ball arithmetic with certified radius (python-flint).
+"""Exact results for hard impacts in rational numbers (python-flint), and energy gains in double-double arithmetic.
 
 Every finite double is a rational number, so an impact given in doubles has an exact outcome of (21),
 v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v = v − (1+e) M⁻¹Jₙᵀ(Jₙ M⁻¹Jₙᵀ)⁻¹Jₙ v, with Jₙ a maximal independent subset
@@ -15,20 +15,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.errors import ArgumentError, MissingDependencyError, SolverError
+from iapb.errors import ArgumentError
+from iapb.lazy import needed
 
 Floats = NDArray[np.float64]
 Rational = Any  # flint.fmpq_mat; named here because flint is imported only when used
-
-_FIRST_BALL_BITS = 256  # first working precision; doubled until the ball is narrow
-_LAST_BALL_BITS = 1 << 14  # if the ball is still wide at this precision, an error is raised
-_BALL_ACCURACY_BITS = 80  # narrow enough to round to the nearest double and to judge its last bit
 
 _SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose products are exact
 _ROUNDING = 2.0**-100  # bound of the error of one double-double operation, which is below 2^-102
@@ -86,11 +84,13 @@ def exact_impact(
         An entry is not finite, or the shapes do not fit.
     """
     mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
-    chosen = independent_rows(contact_jacobian)
-    rows = _take_rows(rational_matrix("contact_jacobian", contact_jacobian, mass.ncols()), chosen)
-    impulse = _generalized_impulse(mass, rows, v, _fmpq(Fraction(restitution)))
+    jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
+    e, chosen, impulse = rational_matrix("restitution", [restitution])[0, 0], independent_rows(contact_jacobian), v - v
+    if chosen:
+        rows = type(mass)(len(chosen), mass.ncols(), [jacobian[i, j] for i in chosen for j in range(mass.ncols())])
+        impulse = rows.transpose() * (rows * mass.solve(rows.transpose())).solve(rows * v) * -(1 + e)
     v_plus = v + mass.solve(impulse)
-    before, after = (_fraction((x.transpose() * mass * x)[0, 0]) / 2 for x in (v, v_plus))
+    before, after = (_fractions(x.transpose() * mass * x)[0] / 2 for x in (v, v_plus))
     return ExactImpact(_fractions(v_plus), _fractions(impulse), chosen, before, after)
 
 
@@ -100,7 +100,7 @@ def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
     if 0 in (jacobian.nrows(), jacobian.ncols()):
         return ()
     reduced, rank = jacobian.transpose().rref()
-    return tuple(_first_nonzero(reduced, i) for i in range(rank))
+    return tuple(next(j for j in range(reduced.ncols()) if reduced[i, j] != 0) for i in range(rank))
 
 
 def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> float:
@@ -109,46 +109,14 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
     If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see `bulk_energy_gain`.
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
-    before, after = (
-        _fraction((x.transpose() * mass * x)[0, 0])
-        for x in (rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus))
-    )
+    given = (rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus))
+    before, after = (_fractions(x.transpose() * mass * x)[0] for x in given)
     if before == 0:
         return 0.0 if after == 0 else np.inf
     try:
         return float((after - before) / before) or 5e-324 * (after > before)
     except OverflowError:  # the gain is above 1.8e308; a loss is never below -1
         return np.inf
-
-
-def ball_impact(
-    mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: float
-) -> tuple[Floats, Floats]:
-    """Return v⁺ of (21) as doubles (d,) and certified bounds (d,) of their error, by ball arithmetic.
-
-    This is faster than `exact_impact` for large problems, because only the choice of independent rows is rational. The
-    precision doubles until every ball's radius is at most 2⁻⁸⁰ of the largest component.
-
-    Raises
-    ------
-    SolverError
-        The ball is still wide at 16384 bits.
-    """
-    flint = _flint()
-    mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
-    jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
-    rows, e = _take_rows(jacobian, independent_rows(contact_jacobian)), _fmpq(Fraction(restitution))
-    bits, before = _FIRST_BALL_BITS, flint.ctx.prec
-    try:
-        while bits <= _LAST_BALL_BITS:
-            flint.ctx.prec = bits
-            balls = _try_balls(flint, mass, rows, v, e)
-            if balls is not None:
-                return balls
-            bits *= 2
-    finally:
-        flint.ctx.prec = before
-    raise SolverError(f"ball arithmetic did not narrow at {_LAST_BALL_BITS} bits")
 
 
 def condition_number(mass_matrix: ArrayLike) -> float:
@@ -170,73 +138,25 @@ def row_condition_number(mass_matrix: ArrayLike, contact_jacobian: ArrayLike) ->
 
 def rational_matrix(argument: str, value: ArrayLike, columns: int | None = None) -> Rational:
     """Return `value` as a matrix of rationals, exactly; a vector becomes a column (unless `columns` is given)."""
-    flint = _flint()
-    array = np.array(value, dtype=object)
+    flint, array = _flint(), np.array(value, dtype=object)
     if array.ndim == 1:
         array = array.reshape(-1, 1) if columns is None else array.reshape(-1, columns)
-    if array.ndim != 2:
-        raise ArgumentError(argument, array.shape, "a vector or a matrix")
-    if columns is not None and array.shape[1] != columns:
-        raise ArgumentError(argument, array.shape, f"{columns} columns")
+    if array.ndim != 2 or columns not in (None, array.shape[1]):
+        raise ArgumentError(argument, array.shape, f"{columns} columns" if columns else "a vector or a matrix")
     try:
-        entries = [_fmpq(Fraction(x)) for x in array.ravel()]
+        fractions = [Fraction(x) for x in array.ravel()]
     except (OverflowError, ValueError, TypeError):
         raise ArgumentError(argument, value, "finite doubles or fractions") from None
-    return flint.fmpq_mat(*array.shape, entries)
+    return flint.fmpq_mat(*array.shape, [flint.fmpq(x.numerator, x.denominator) for x in fractions])
 
 
+@cache
 def _flint() -> Any:
-    try:
-        import flint
-    except ImportError as error:
-        raise MissingDependencyError(
-            "python-flint", "exact arithmetic", "pip install python-flint"
-        ) from error
-    return flint
-
-
-def _fmpq(x: Fraction) -> Any:
-    return _flint().fmpq(x.numerator, x.denominator)
-
-
-def _fraction(x: Any) -> Fraction:
-    return Fraction(int(x.p), int(x.q))
+    return needed("flint", "Exact arithmetic")
 
 
 def _fractions(column: Rational) -> tuple[Fraction, ...]:
-    return tuple(_fraction(x) for x in column.entries())
-
-
-def _take_rows(matrix: Rational, rows: tuple[int, ...]) -> Rational:
-    entries = [matrix[i, j] for i in rows for j in range(matrix.ncols())]
-    return _flint().fmpq_mat(len(rows), matrix.ncols(), entries)
-
-
-def _first_nonzero(matrix: Rational, row: int) -> int:
-    return next(j for j in range(matrix.ncols()) if matrix[row, j] != 0)
-
-
-def _generalized_impulse(mass: Any, rows: Any, v: Any, e: Any) -> Any:
-    """Return −(1+e) Jₙᵀ (Jₙ M⁻¹ Jₙᵀ)⁻¹ Jₙ v in the arithmetic of the matrices (rationals or balls)."""
-    if rows.nrows() == 0:
-        return v - v
-    delassus = rows * mass.solve(rows.transpose())
-    return rows.transpose() * delassus.solve(rows * v) * -(1 + e)
-
-
-def _try_balls(flint: Any, mass: Any, rows: Any, v: Any, e: Any) -> tuple[Floats, Floats] | None:
-    ball_mass, ball_rows, ball_v = flint.arb_mat(mass), flint.arb_mat(rows), flint.arb_mat(v)
-    try:
-        impulse = _generalized_impulse(ball_mass, ball_rows, ball_v, flint.arb(e))
-        entries = (ball_v + ball_mass.solve(impulse)).entries()
-    except ZeroDivisionError:  # a pivot's ball contains zero: more bits are needed
-        return None
-    largest = max((float(abs(x).upper()) for x in entries), default=0.0)
-    if any(float(x.rad()) > largest * 2.0**-_BALL_ACCURACY_BITS for x in entries):
-        return None
-    middle = np.array([float(x.mid()) for x in entries])
-    bounds = [float(abs(x - flint.arb(m)).upper()) for x, m in zip(entries, middle, strict=True)]
-    return middle, np.nextafter(bounds, np.inf)  # float() rounds to nearest; a bound must round up
+    return tuple(Fraction(int(x.p), int(x.q)) for x in column.entries())
 
 
 def _nonzero_eigenvalues(matrix: Rational) -> list[float]:
@@ -258,18 +178,15 @@ def bulk_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLi
         raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
     if masses.shape not in ((d, d), (n, d, d)):
         raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
-    _check_magnitudes(masses, before, after)
-    gain, bound = np.empty(n), np.empty(n)
-    _gains(np.ascontiguousarray(np.broadcast_to(masses, (n, d, d))), before, after, gain, bound)
-    return gain, bound
-
-
-def _check_magnitudes(masses: Floats, before: Floats, after: Floats) -> None:
     for argument, array in (("mass_matrix", masses), ("v_minus", before), ("v_plus", after)):
         size = np.abs(array[array != 0.0])
         if not np.isfinite(array).all() or (size.size and (size.max() > _LARGEST or size.min() < _SMALLEST)):
             expected = f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
             raise ArgumentError(argument, array, expected)
+    gain, bound = np.empty(n), np.empty(n)
+    symmetric = np.broadcast_to((masses == np.swapaxes(masses, -1, -2)).all(axis=(-2, -1)), n)
+    _gains(np.ascontiguousarray(np.broadcast_to(masses, (n, d, d))), symmetric, before, after, gain, bound)
+    return gain, bound
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -325,16 +242,7 @@ def _bilinear(mass, ah, al, bh, bl):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, fastmath=False)
-def _symmetric(mass):  # type: ignore[no-untyped-def]
-    for i in range(len(mass)):
-        for j in range(i):
-            if mass[i, j] != mass[j, i]:
-                return False
-    return True
-
-
-@numba.njit(cache=True, fastmath=False)
-def _gains(masses, before, after, gain, bound):  # type: ignore[no-untyped-def]
+def _gains(masses, symmetric, before, after, gain, bound):  # type: ignore[no-untyped-def]
     """Write the relative gain and its bound for each impact."""
     n, d = before.shape
     difference, difference_low = np.empty(d), np.empty(d)
@@ -344,7 +252,7 @@ def _gains(masses, before, after, gain, bound):  # type: ignore[no-untyped-def]
             difference[i], difference_low[i] = _two_sum(after[k, i], -before[k, i])
             total[i], total_low[i] = _two_sum(after[k, i], before[k, i])
         change, low, size = _bilinear(masses[k], difference, difference_low, total, total_low)
-        if not _symmetric(masses[k]):
+        if not symmetric[k]:
             turned, turned_low, turned_size = _bilinear(masses[k], total, total_low, difference, difference_low)
             change, size = 0.5 * _add(change, low, turned, turned_low)[0], 0.5 * (size + turned_size)
         energy, _, energy_size = _bilinear(masses[k], before[k], zero, before[k], zero)

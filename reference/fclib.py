@@ -8,13 +8,15 @@ Source: Acary, Brémond, Koziara, Pérignon, FCLIB: a collection of discrete 3D 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import index
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from iapb.errors import ArgumentError, IapbError
+from iapb.lazy import needed
 from reference.complementarity.problem import ImpactProblem
 from reference.hdf5 import leads_out
 
@@ -68,38 +70,39 @@ def read_fclib(path: Path | str) -> StoredProblem:
     MissingDependencyError
         h5py is not installed.
     """
-    path, h5py = Path(path), _h5py()
+    path, h5py = Path(path), needed("h5py", "FCLIB files")
     try:
         with h5py.File(path, "r") as file:
             if outside := leads_out(file):
-                raise DatasetError(path, f"{outside}: expected a file without links to other files")
-            kinds = [name for name in ("fclib_local", "fclib_global") if name in file]
-            if not kinds:
-                raise DatasetError(path, "is HDF5 but holds neither fclib_local nor fclib_global")
-            group = file[kinds[0]]
-            reader = _read_local if kinds[0] == "fclib_local" else _read_global
-            problem = reader(path, group)
-            remark = " ".join(_string(group, "info/title").split())
-            return StoredProblem(problem, _stored_impulse(path, file, problem.size), remark, kinds[0])
-    except DatasetError:
-        raise
-    except IapbError as error:
-        raise DatasetError(path, str(error)) from error
+                raise ValueError(f"{outside}: expected a file without links to other files")
+            kind = "fclib_local" if "fclib_local" in file else "fclib_global"
+            group = file[kind]
+            problem = _local(group, path.name) if kind == "fclib_local" else _global(group, path.name)
+            r = _numbers(file, "solution/r") if "solution/r" in file else np.zeros(0)
+            stored = r if r.any() and len(r) == problem.size else None  # zeros are a placeholder, not a solution
+            title = bytes(group["info/title"][()]) if "info/title" in group else b""
+            return StoredProblem(problem, stored, " ".join(title.decode("utf-8", "replace").rstrip("\0").split()), kind)
     except Exception as error:  # a damaged or foreign HDF5 file can raise any exception
         raise DatasetError(path, f"cannot be read: {' '.join(str(error).split())}") from error
 
 
-def write_fclib(
-    path: Path | str, problem: ImpactProblem, title: str = "", impulse: Floats | None = None
-) -> None:
+def write_fclib(path: Path | str, problem: ImpactProblem, title: str = "", impulse: Floats | None = None) -> None:
     """Write a problem (and its solution) as fclib_local; W is stored as compressed rows.
 
     A frictionless problem is written with two zero tangential components per contact and mu = 0. Restitution is
     included in q, because FCLIB has no e; reading the file gives the same complementarity problem with e = 0.
     """
-    h5py = _h5py()
-    w, q, r, size = _three_components(problem, impulse)
-    with h5py.File(path, "w") as file:
+    if problem.relaxed:
+        raise ArgumentError("problem", problem.name, "Coulomb's law: FCLIB has no mark for the relaxed one")
+    w, q, r, size = problem.delassus, problem.offset, impulse, problem.contact_size
+    if size == 1:
+        size, normals = 3, np.arange(0, 3 * problem.size, 3)
+        w, q = np.zeros((3 * problem.size,) * 2), np.zeros(3 * problem.size)
+        w[np.ix_(normals, normals)], q[normals] = problem.delassus, problem.offset
+        if impulse is not None:
+            r = np.zeros(3 * problem.size)
+            r[normals] = impulse
+    with needed("h5py", "FCLIB files").File(path, "w") as file:
         group = file.create_group("fclib_local")
         _write_rows(group.create_group("W"), w)
         group["vectors/q"], group["vectors/mu"] = q, problem.friction_or_zero
@@ -109,121 +112,61 @@ def write_fclib(
             file["solution/r"], file["solution/u"] = r, w @ r + q
 
 
-def _h5py() -> Any:
-    try:
-        import h5py
-    except ImportError as error:
-        raise MissingDependencyError("h5py", "FCLIB files", "pip install h5py") from error
-    return h5py
+def _local(group: Any, name: str) -> ImpactProblem:
+    w, q, mu = _matrix(group["W"], LARGEST_SIZE), _numbers(group, "vectors/q"), _numbers(group, "vectors/mu")
+    return ImpactProblem.from_delassus(w.toarray(), q, 0.0, mu, contact_size=_spacedim(group), name=name)
 
 
-def _read_local(path: Path, group: Any) -> ImpactProblem:
-    q, mu = _vector(path, group, "vectors/q"), _vector(path, group, "vectors/mu")
-    w = _matrix(path, group["W"], "W").toarray()
-    size = _spacedim(path, group, len(mu), len(q))
-    return ImpactProblem.from_delassus(w, q, 0.0, mu, contact_size=size, name=path.name)
-
-
-def _read_global(path: Path, group: Any) -> ImpactProblem:
+def _global(group: Any, name: str) -> ImpactProblem:
     from scipy.sparse.linalg import splu
 
-    mass, h = _matrix(path, group["M"], "M"), _matrix(path, group["H"], "H")
-    f, w, mu = (_vector(path, group, f"vectors/{name}") for name in ("f", "w", "mu"))
-    if mass.shape != (len(f), len(f)) or h.shape != (len(f), len(w)):
-        raise DatasetError(path, f"shapes M {mass.shape}, H {h.shape}, f {f.shape}, w {w.shape} do not fit")
-    if len(w) > LARGEST_SIZE:
-        raise DatasetError(path, f"{len(w)} unknowns: expected at most {LARGEST_SIZE}")
-    size, factors = _spacedim(path, group, len(mu), len(w)), splu(mass)
+    mass, h = _matrix(group["M"], LARGEST_MATRIX), _matrix(group["H"], LARGEST_MATRIX)
+    f, w, mu = (_numbers(group, f"vectors/{key}") for key in ("f", "w", "mu"))
+    if len(w) > LARGEST_SIZE or h.shape != (len(f), len(w)):
+        raise ValueError(f"H {h.shape}, f {f.shape}, w {w.shape}: expected at most {LARGEST_SIZE} unknowns")
+    size, factors = _spacedim(group), splu(mass)
     free = factors.solve(f)
     if not w.any() and len(f) <= WITH_MECHANICS:
-        dense, rows = mass.toarray(), h.T.toarray()
-        return ImpactProblem.from_impact(dense, rows, free, 0.0, mu, contact_size=size, name=path.name)
+        return ImpactProblem.from_impact(mass.toarray(), h.T.toarray(), free, 0.0, mu, contact_size=size, name=name)
     # w ≠ 0 has no generalized velocity, and a large dense M needs too much memory: return W and q only
     delassus = np.hstack([h.T @ factors.solve(h[:, k : k + _BLOCK].toarray()) for k in range(0, len(w), _BLOCK)]
                          or [np.zeros((0, 0))])  # fmt: skip
-    return ImpactProblem.from_delassus(delassus, h.T @ free + w, 0.0, mu, contact_size=size, name=path.name)
+    return ImpactProblem.from_delassus(delassus, h.T @ free + w, 0.0, mu, contact_size=size, name=name)
 
 
-def _spacedim(path: Path, group: Any, contacts: int, components: int) -> int:
-    size = _whole(path, group, "spacedim")
-    if size not in (2, 3) or contacts * size != components:
-        raise DatasetError(
-            path, f"spacedim {size}, {contacts} contacts and {components} components do not fit"
-        )
+def _spacedim(group: Any) -> int:
+    size = index(_numbers(group, "spacedim", "iu").item())
+    if size not in (2, 3):
+        raise ValueError(f"spacedim {size}: expected 2 or 3")
     return size
 
 
-def _vector(path: Path, group: Any, name: str) -> Floats:
-    return _numbers(path, group, name, "iuf").astype(np.float64)
-
-
-def _numbers(path: Path, group: Any, name: str, kinds: str) -> NDArray[Any]:
-    """Return a dataset of real numbers as a vector; its header is checked before it is read."""
+def _numbers(group: Any, name: str, kinds: str = "iuf") -> NDArray[Any]:
+    """Return a dataset of finite numbers as a vector; its header is checked before it is read."""
     dataset = group[name]
-    if not hasattr(dataset, "dtype") or dataset.dtype.kind not in kinds or dataset.shape is None:
-        raise DatasetError(path, f"{name} is no dataset of {'whole ' if kinds == 'iu' else ''}numbers")
-    if dataset.size > LARGEST_SIZE**2:
-        raise DatasetError(path, f"{name} holds {dataset.size} numbers: more than this reader accepts")
+    if dataset.dtype.kind not in kinds or dataset.size > LARGEST_SIZE**2:
+        raise ValueError(f"{name}: {dataset.dtype}, {dataset.shape}: expected at most {LARGEST_SIZE**2} numbers")
     values = np.asarray(dataset[()]).ravel()
     if not np.isfinite(values).all():
-        raise DatasetError(path, f"{name} holds a number that is not finite")
-    return values
+        raise ValueError(f"{name} holds a number that is not finite")
+    return values if kinds == "iu" else values.astype(np.float64)
 
 
-def _whole(path: Path, group: Any, name: str) -> int:
-    values = _numbers(path, group, name, "iu")
-    if len(values) != 1:
-        raise DatasetError(path, f"{name} holds {len(values)} numbers: expected one")
-    return int(values[0])
-
-
-def _string(group: Any, name: str) -> str:
-    return bytes(group[name][()]).decode("utf-8", "replace").rstrip("\0") if name in group else ""
-
-
-def _matrix(path: Path, group: Any, name: str) -> Any:
+def _matrix(group: Any, most: int) -> Any:
     """Return a CXSparse matrix as a sparse matrix of compressed columns."""
     from scipy import sparse
 
-    m, n, nz = (_whole(path, group, key) for key in ("m", "n", "nz"))
-    i, p, x = (_numbers(path, group, key, kinds) for key, kinds in (("i", "iu"), ("p", "iu"), ("x", "iuf")))
-    most = LARGEST_SIZE if name == "W" else LARGEST_MATRIX
-    if not (0 <= m <= most and 0 <= n <= most and (nz in (_ROWS, _COLUMNS) or 0 <= nz <= len(x))):
-        raise DatasetError(path, f"matrix {name} of {m} x {n} with nz = {nz}: expected at most {most} rows and "
-                           "columns, and nz -1, -2 or the number of its entries")  # fmt: skip
-    try:
-        if nz in (_ROWS, _COLUMNS):
-            compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)((x, i, p), shape=(m, n))
-            compressed.check_format(full_check=True)  # an index out of range would write outside the array
-            return compressed.tocsc()
-        return sparse.coo_matrix((x[:nz], (i[:nz], p[:nz])), shape=(m, n)).tocsc()
-    except (ValueError, IndexError) as error:
-        raise DatasetError(path, f"matrix {name} is damaged: {error}") from error
-
-
-def _stored_impulse(path: Path, file: Any, size: int) -> Floats | None:
-    if "solution/r" not in file:
-        return None
-    r = _vector(path, file, "solution/r")
-    return r if r.any() and len(r) == size else None  # zeros are a placeholder, not a solution
-
-
-def _three_components(
-    problem: ImpactProblem, impulse: Floats | None
-) -> tuple[Floats, Floats, Floats | None, int]:
-    """Return W, q, r and the number of components per contact in FCLIB's layout, which has 2 or 3 components."""
-    if problem.relaxed:
-        raise ArgumentError("problem", problem.name, "Coulomb's law: FCLIB has no mark for the relaxed one")
-    if problem.contact_size > 1:
-        return problem.delassus, problem.offset, impulse, problem.contact_size
-    n = problem.size
-    w, q = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
-    w[::3, ::3], q[::3] = problem.delassus, problem.offset
-    if impulse is None:
-        return w, q, None, 3
-    r = np.zeros(3 * n)
-    r[::3] = impulse
-    return w, q, r, 3
+    m, n, nz = (index(_numbers(group, key, "iu").item()) for key in ("m", "n", "nz"))
+    i, p, x = _numbers(group, "i", "iu"), _numbers(group, "p", "iu"), _numbers(group, "x")
+    if not (0 <= m <= most and 0 <= n <= most):
+        raise ValueError(f"{group.name} of {m} x {n}: expected at most {most} rows and columns")
+    if nz in (_ROWS, _COLUMNS):
+        compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)((x, i, p), shape=(m, n))
+        compressed.check_format(full_check=True)  # an index out of range would write outside the array
+        return compressed.tocsc()
+    if not 0 <= nz <= len(x):
+        raise ValueError(f"{group.name} with nz = {nz}: expected -1, -2 or the number of its entries")
+    return sparse.coo_matrix((x[:nz], (i[:nz], p[:nz])), shape=(m, n)).tocsc()
 
 
 def _write_rows(group: Any, matrix: Floats) -> None:
@@ -232,8 +175,4 @@ def _write_rows(group: Any, matrix: Floats) -> None:
     rows = sparse.csr_matrix(matrix)
     for name, number in (("m", rows.shape[0]), ("n", rows.shape[1]), ("nz", _ROWS), ("nzmax", rows.nnz)):
         group[name] = np.array([number], np.int32)
-    group["i"], group["p"], group["x"] = (
-        rows.indices.astype(np.int32),
-        rows.indptr.astype(np.int32),
-        rows.data,
-    )
+    group["i"], group["p"], group["x"] = rows.indices.astype(np.int32), rows.indptr.astype(np.int32), rows.data

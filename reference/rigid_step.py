@@ -40,7 +40,9 @@ from iapb.errors import ArgumentError, SolverError
 from iapb.names import one_of
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import SOLVED_TOLERANCE, Solution
-from reference.complementarity.solvers import daqp_qp, gauss_seidel, quadprog_qp, solve
+from reference.complementarity.solvers import solve
+from reference.complementarity.solvers.qp import daqp, quadprog
+from reference.complementarity.solvers.sweeps import projected_sweeps
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +52,8 @@ STEP_TOLERANCE = 1e-10
 # from above and as much from below. Each is a sum of some dozens of products.
 STEP_ROUNDING = 100.0 * float(np.finfo(np.float64).eps)
 
+# Active sets cycle for some redundant rows, projections do not.
+STEP_SOLVERS = {"daqp": daqp, "quadprog": quadprog, "gauss_seidel": projected_sweeps}
 SCHEMES = ("automatic", "moreau", "stewart-trinkle")
 NEWTON, POISSON = "Newton", "Poisson"
 
@@ -77,16 +81,8 @@ class RigidStep(NamedTuple):
 
 
 def rigid_step(
-    mass_matrix: Floats,
-    velocity: Floats,
-    force: Floats,
-    dt: float,
-    contact_jacobian: Floats,
-    gap: Floats,
-    gamma_minus: Floats,
-    restitution: float | Floats,
-    stabilization: float = 0.0,
-    scheme: str = "automatic",
+    mass_matrix: Floats, velocity: Floats, force: Floats, dt: float, contact_jacobian: Floats, gap: Floats,
+    gamma_minus: Floats, restitution: float | Floats, stabilization: float = 0.0, scheme: str = "automatic",
 ) -> RigidStep:
     """Advance v (d,) by dt [s] under generalized force f (d,) and unilateral contacts.
 
@@ -106,30 +102,34 @@ def rigid_step(
     SolverError
         No solver reaches a residual of STEP_TOLERANCE; the message gives the number of contacts and each solver's text.
     """
+    bounces = bool(np.any(restitution))
     bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
     v_free = velocity + dt * solve_mass(mass_matrix, force)
-    poisson = scheme == "stewart-trinkle" and bool(np.any(np.greater(restitution, 0.0)))
+    poisson = scheme == "stewart-trinkle" and bounces
     if not poisson:
         try:
             newton = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
         except SolverError:
-            if not np.any(restitution) or np.count_nonzero(gap <= 0.0) < 2:
+            if not bounces or np.count_nonzero(gap <= 0.0) < 2:
                 raise
         else:
             # With e = 0 the step is a projection onto a set with v = 0, so it cannot gain energy.
-            if not np.any(restitution) or not _gains(newton, contact_jacobian, gamma_minus, v_free):
+            if not bounces or not _gains(newton, contact_jacobian, gamma_minus, v_free):
                 return newton
-    compression = velocity_bounds(gap, gamma_minus, 0.0, dt, 0.0 if not poisson else stabilization, scheme)
+    compression = velocity_bounds(gap, gamma_minus, 0.0, dt, stabilization if poisson else 0.0, scheme)
     compression = np.where(np.isfinite(bound), compression, -np.inf)
-    returning = np.where(gamma_minus < 0.0, restitution, 0.0)
-    return poisson_step(mass_matrix, v_free, contact_jacobian, compression, returning)
+    compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, compression)
+    returned = np.where(gamma_minus < 0.0, restitution, 0.0) * compressed.impulse
+    bounced = compressed.velocity + solve_mass(mass_matrix, contact_jacobian.T @ returned)
+    kept = nearest_velocity(mass_matrix, bounced, contact_jacobian, compression)
+    impulse = compressed.impulse + returned + kept.impulse
+    return RigidStep(kept.velocity, impulse, max(compressed.residual, kept.residual), POISSON)
 
 
 def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_free: Floats) -> bool:
     """Whether the works of the contacts, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), are both positive beyond rounding.
 
-    The scale includes γ_free, the effect of the load: at rest, γ⁻ is rounding error of either sign, which must not
-    trigger a bounce.
+    The scale includes γ_free, the effect of the load: at rest, γ⁻ is rounding error of either sign.
     """
     gamma_plus, gamma_free = contact_jacobian @ step.velocity, contact_jacobian @ v_free
     size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_free) + np.abs(gamma_plus)))
@@ -137,21 +137,7 @@ def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_fre
     return work > STEP_TOLERANCE * size
 
 
-def poisson_step(
-    mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats, restitution: Floats
-) -> RigidStep:
-    """Compress to J v >= b, add e_i times each impulse (c,), and project onto J v >= b once more."""
-    compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
-    returned = restitution * compressed.impulse
-    bounced = compressed.velocity + solve_mass(mass_matrix, contact_jacobian.T @ returned)
-    kept = nearest_velocity(mass_matrix, bounced, contact_jacobian, bound)
-    impulse = compressed.impulse + returned + kept.impulse
-    return RigidStep(kept.velocity, impulse, max(compressed.residual, kept.residual), POISSON)
-
-
-def nearest_velocity(
-    mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats
-) -> RigidStep:
+def nearest_velocity(mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats) -> RigidStep:
     """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf ignores a row."""
     impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
     offset = contact_jacobian[kept] @ v_free - bound[kept]
@@ -236,44 +222,27 @@ def velocity_bounds(
 def _solve_step(rows: Floats, offset: Floats, scale: float) -> tuple[Floats, float]:
     """Return p and its recomputed residual from the first solver that reaches STEP_TOLERANCE or rounding level."""
     said: list[str] = []
-    for solver in (daqp_qp, quadprog_qp, gauss_seidel):  # active sets cycle for some redundant rows, projections do not
-        if solver is gauss_seidel and "infeasible" in said[0]:
+    for name, solver in STEP_SOLVERS.items():
+        if name == "gauss_seidel" and "infeasible" in said[0]:
             continue
         try:
-            impulse = solver.multipliers(rows, offset)
+            impulse = solver(rows, offset)
         except SolverError as error:
             said.append(str(error))
             continue
-        residual = step_residual(rows, offset, impulse) / scale
-        if residual <= max(STEP_TOLERANCE, STEP_ROUNDING * _cancelling(rows, impulse) / scale):
+        # the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + offset >= 0, and the terms that cancel in w
+        natural = np.minimum(np.einsum("ij,ij->i", rows, rows) * impulse, rows @ (rows.T @ impulse) + offset)
+        residual, sizes = float(np.abs(natural).max(initial=0.0)) / scale, np.abs(rows)
+        cancelling = float((sizes @ (sizes.T @ np.abs(impulse))).max(initial=0.0))
+        if residual <= max(STEP_TOLERANCE, STEP_ROUNDING * cancelling / scale):
             return impulse, residual
-        said.append(f"{solver.__name__.rsplit('.', 1)[-1]}: residual {residual:.1e}")
+        said.append(f"{name}: residual {residual:.1e}")
     raise SolverError(f"rigid step with {len(offset)} contacts has no accepted solution: " + "; ".join(said))
 
 
-def _cancelling(rows: Floats, impulse: Floats) -> float:
-    """Return the largest entry of |A| |Aᵀ| |p| [m/s], the size of the terms that cancel in A Aᵀ p."""
-    sizes = np.abs(rows)
-    return float((sizes @ (sizes.T @ np.abs(impulse))).max(initial=0.0))
-
-
-def step_residual(rows: Floats, offset: Floats, impulse: Floats) -> float:
-    """Return the largest |min(W_ii p_i, w_i)| [m/s] of  0 <= p ⟂ w = A Aᵀ p + offset >= 0; inf if p is not finite."""
-    if not np.isfinite(impulse).all():
-        return np.inf
-    w = rows @ (rows.T @ impulse) + offset
-    inertia = np.einsum("ij,ij->i", rows, rows)
-    return float(np.abs(np.minimum(inertia * impulse, w)).max(initial=0.0))
-
-
 def friction_step(
-    mass_matrix: Floats,
-    v_free: Floats,
-    normal_rows: Floats,
-    tangent_rows: Floats,
-    bound: Floats,
-    friction: float | Floats,
-    relaxed: bool = False,
+    mass_matrix: Floats, v_free: Floats, normal_rows: Floats, tangent_rows: Floats, bound: Floats,
+    friction: float | Floats, relaxed: bool = False,
 ) -> tuple[Floats, Floats, Floats]:
     """Return v⁺ (d,), normal (c,) and tangential impulses (c, s) [N s] of one step.
 
@@ -305,33 +274,27 @@ def friction_step(
 
 
 def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> Floats:
-    """Return p (k, size) for W (k size, k size) and offset (k, size) [m/s], island by island."""
+    """Return p (k, size) for W (k size, k size) and offset (k, size) [m/s], island by island.
+
+    Each island has the first solution that converges, else the best one if it reaches FRICTION_TOLERANCE.
+    """
     from scipy.sparse.csgraph import connected_components
 
     count, size = offset.shape
-    blocks = w.reshape(count, size, count, size)
+    blocks, impulse = w.reshape(count, size, count, size), np.zeros_like(offset)
     islands, island = connected_components((blocks != 0.0).any(axis=(1, 3)), directed=False)
-    impulse = np.zeros_like(offset)
     for mine in (np.flatnonzero(island == k) for k in range(islands)):
-        part = blocks[mine][:, :, mine].reshape(len(mine) * size, -1)
-        problem = ImpactProblem.from_delassus(
-            part, offset[mine].ravel(), 0.0, friction[mine], contact_size=size, relaxed=relaxed
-        )
-        impulse[mine] = _solve_friction(problem).reshape(-1, size)
+        problem = ImpactProblem.from_delassus(blocks[mine][:, :, mine].reshape(len(mine) * size, -1),
+                                              offset[mine].ravel(), 0.0, friction[mine], contact_size=size,
+                                              relaxed=relaxed)  # fmt: skip
+        found: list[Solution] = []
+        for solver in FRICTION_SOLVERS:
+            found.append(solve(problem, solver))
+            if found[-1].solved(CONVERGED):
+                break
+        best = found[-1] if found[-1].solved(CONVERGED) else min(found, key=lambda one: one.residuals.worst)
+        if not best.solved(FRICTION_TOLERANCE):
+            said = "; ".join(f"{x.solver}: residual {x.residuals.worst:.1e}, {x.note}" for x in found)
+            raise SolverError(f"rigid step with friction and {len(mine)} contacts has no accepted solution: {said}")
+        impulse[mine] = best.answer().reshape(-1, size)
     return impulse
-
-
-def _solve_friction(problem: ImpactProblem) -> Floats:
-    """Return p (n,) of the first solver that converges, else the best one if it reaches FRICTION_TOLERANCE."""
-    found: list[Solution] = []
-    for solver in FRICTION_SOLVERS:
-        found.append(solve(problem, solver))
-        if found[-1].solved(CONVERGED):
-            return found[-1].answer()
-    best = min(found, key=lambda solution: solution.residuals.worst)
-    if best.solved(FRICTION_TOLERANCE):
-        return best.answer()
-    said = "; ".join(f"{x.solver}: residual {x.residuals.worst:.1e}, {x.note}" for x in found)
-    raise SolverError(
-        f"rigid step with friction and {problem.contacts} contacts has no accepted solution: {said}"
-    )

@@ -39,7 +39,7 @@ from iapb.scene.mechanism import one_restitution
 from iapb.system import System, wrenches_of
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
-from reference.contact_rows import find_rows, identities, mechanics_of
+from reference.contact_rows import find_rows, mechanics_of
 from reference.rigid_body import PinocchioMechanism, model_of
 from reference.rigid_step import nearest_velocity
 
@@ -64,11 +64,7 @@ class Tolerances(NamedTuple):
     steps: int = 20
 
 
-COMPUTATIONS = (
-    Tolerances(),
-    Tolerances(1e-11, 3e-9, 3e-10, 3e-9, 31),
-    Tolerances(1e-10, 3e-8, 3e-9, 3e-8, 23),
-)
+COMPUTATIONS = (Tolerances(), Tolerances(1e-11, 3e-9, 3e-10, 3e-9, 31), Tolerances(1e-10, 3e-8, 3e-9, 3e-8, 23))
 BOUNCE = 1e-7  # largest height [m] of a neglected bounce; above twice every `closed`, so that other bounces open
 _KEPT = 0.1  # of `released`: threshold right after an event, lower so that a contact that let go does not last again
 _DEPENDENT = 1e-9  # singular value, relative to the largest, below which held rows depend on one another
@@ -173,17 +169,8 @@ class _Motion:
     def rows(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
         """Return gap and row (d,) of every candidate contact."""
         found = find_rows(self.system, q, v, np.inf)
-        names = identities(found.geometry, range(len(found.gap)))
-        return {name: (float(found.gap[i]), found.jacobian[i]) for i, name in enumerate(names)}
-
-    def force(self, state: Floats) -> Floats:
-        """Return the applied force − B − G (d,), including the coupling."""
-        q, v, device_q, device_v = self.split(state)
-        force = self._hand(self.mechanics, q, self.d) - self.mechanics.inner_forces(q, v, self.system.gravity)
-        force -= self.system.joint_damping * v
-        if self.coupled:
-            force[self.tool] += self._pull(device_q - q[self.tool], device_v - v[self.tool])
-        return force
+        names = zip(found.geometry.shape_a, found.geometry.shape_b, found.geometry.feature, strict=True)
+        return {(int(a), int(b), int(f)): (float(found.gap[i]), found.jacobian[i]) for i, (a, b, f) in enumerate(names)}
 
     def _hand(self, mechanics: PinocchioMechanism, q: Floats, size: int) -> Floats:
         hand = self.scene.hand
@@ -203,9 +190,13 @@ class _Motion:
 
     def _here(self, state: Floats, names: list[Contact]) -> _Here:
         """Return dynamics and rows of the named contacts in a state, with J̇v by fourth-order differences."""
-        q, v, _, _ = self.split(state)
+        q, v, device_q, device_v = self.split(state)
+        force = self._hand(self.mechanics, q, self.d) - self.mechanics.inner_forces(q, v, self.system.gravity)
+        force -= self.system.joint_damping * v
+        if self.coupled:
+            force[self.tool] += self._pull(device_q - q[self.tool], device_v - v[self.tool])
         mass = self.mechanics.mass_matrix(q)
-        free = np.asarray(np.linalg.solve(mass, self.force(state)), np.float64)
+        free = np.asarray(np.linalg.solve(mass, force), np.float64)
         if not names:
             return _Here(v, mass, free, np.zeros((0, self.d)), np.zeros(0))
 
@@ -217,23 +208,18 @@ class _Motion:
         drift = (4.0 * turning(h) - turning(2.0 * h)) / 3.0
         return _Here(v, mass, free, np.array([found[n][1] for n in names]), drift)
 
-    def acceleration(self, state: Floats) -> tuple[Floats, Floats]:
-        """Return a (d,) with the lasting contacts kept closed, and their generalized force (d,) of either sign."""
+    def rate(self, _time: float, state: Floats) -> Floats:
+        """Return the derivative of the state, with the lasting contacts kept closed by forces of either sign."""
+        q, v, device_q, device_v = self.split(state)
         here = self._here(state, self.held)
         change = _least_change(here.mass, here.rows, -(here.rows @ here.free + here.drift))
-        return here.free + change, np.asarray(here.mass @ change, np.float64)
-
-    def rate(self, _time: float, state: Floats) -> Floats:
-        """Return the derivative of the state."""
-        q, v, device_q, device_v = self.split(state)
-        acceleration, contact = self.acceleration(state)
         if self.device is None:
-            return np.concatenate([self.mechanics.rate(q, v), acceleration])
-        force = self._hand(self.device, device_q, len(device_q)) + contact[self.tool]
+            return np.concatenate([self.mechanics.rate(q, v), here.free + change])
+        force = self._hand(self.device, device_q, len(device_q)) + (here.mass @ change)[self.tool]
         force += self._pull(q[self.tool] - device_q, v[self.tool] - device_v) - self.device.bias(device_q, device_v)
         force -= self.drag * device_v
         moved = np.linalg.solve(self.device.mass_matrix(device_q), force)
-        return np.concatenate([v, acceleration, device_v, moved])
+        return np.concatenate([v, here.free + change, device_v, moved])
 
     def strike(self, state: Floats) -> tuple[Floats, bool]:
         """Return the state after an impact of all closed contacts, and whether it is an event; update `held`."""
@@ -242,25 +228,25 @@ class _Motion:
         names = [n for n, (gap, _) in found.items() if gap <= self.tolerances.closed or n in self.held]
         rows = np.array([found[n][1] for n in names]).reshape(len(names), self.d)
         self.widest = max([self.widest, *(found[n][0] for n in names)])
-        mass, impacts = self.mechanics.mass_matrix(q), 0
+        mass, impacts, before = self.mechanics.mass_matrix(q), 0, self.held
+
+        def pushed(impulse: Floats) -> Floats:
+            """Return the device's velocity after a generalized impulse on the tool."""
+            if self.device is None:
+                return device_v
+            return np.asarray(device_v + np.linalg.solve(self.device.mass_matrix(device_q), impulse[self.tool]))
+
         while (rows @ v < -self.tolerances.at_rest).any():
             impacts += 1
             if impacts > _AT_ONCE:
                 raise SolverError(f"{self.scene.name}: no reference: more than {_AT_ONCE} impacts at one instant")
             outcome = newton_lcp(ImpactProblem.from_impact(mass, rows, v, self.restitution))
-            v = outcome.velocity
-            if self.device is not None:
-                impulse = (rows.T @ outcome.impulse)[self.tool]
-                device_v += np.linalg.solve(self.device.mass_matrix(device_q), impulse)
-        before, after = self.held, np.concatenate([q, v, device_q, device_v])
-        lasting = self._lasting(after, names)
+            v, device_v = outcome.velocity, pushed(rows.T @ outcome.impulse)
+        lasting = self._lasting(np.concatenate([q, v, device_q, device_v]), names)
         self.held = [n for n, stays in zip(names, lasting, strict=True) if stays]
         self.leaving = [n for n, stays in zip(names, lasting, strict=True) if not stays]
         change = _least_change(mass, rows[lasting], -rows[lasting] @ v)
-        after[self.nq : self.nq + self.d] += change
-        if self.device is not None:
-            impulse = (mass @ change)[self.tool]
-            after[self.nq + self.d + len(device_q) :] += np.linalg.solve(self.device.mass_matrix(device_q), impulse)
+        after = np.concatenate([q, v + change, device_q, pushed(mass @ change)])
         return after, impacts > 0 or set(before) != set(self.held)
 
     def require_no_overlap(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
@@ -277,7 +263,7 @@ class _Motion:
         speed = here.rows @ here.v
         resting = np.abs(speed) <= self.tolerances.at_rest
         while True:
-            away = self._away(here, resting)
+            away = _away(here, resting)
             back = ~resting & (speed > 0.0) & (speed**2 <= -2.0 * away * BOUNCE)
             if not back.any():
                 falling = ~resting & (away < 0.0)
@@ -287,11 +273,6 @@ class _Motion:
             shrinking = max(1.0 - self.restitution**2, np.finfo(float).tiny)
             self.bounced += float(np.minimum(2.0 * heights / shrinking, speed[back] * self.duration).sum())
             resting |= back
-
-    def _away(self, here: _Here, resting: NDArray[np.bool_]) -> Floats:
-        """Return the opening accelerations (c,) [m/s²] of the contacts, with resting contacts kept from closing."""
-        bound = np.where(resting, -here.drift, -np.inf)
-        return here.rows @ nearest_velocity(here.mass, here.free, here.rows, bound).velocity + here.drift
 
     def _least(self, here: _Here) -> Floats:
         """Return thresholds (c,) [m/s²] of opening: `released` times those of forces and v/T, plus `at_rest`/T."""
@@ -305,7 +286,7 @@ class _Motion:
         if not self.held:
             return 1.0
         here = self._here(state, self.held)
-        return float((self._least(here) - self._away(here, np.ones(len(self.held), np.bool_))).min())
+        return float((self._least(here) - _away(here, np.ones(len(self.held), np.bool_))).min())
 
     def closing(self, state: Floats) -> float:
         """Return the least gap [m] of the contacts that may close; one that has just opened may overlap by `closed`."""
@@ -320,6 +301,12 @@ class _Motion:
         q, v, _, _ = self.split(state)
         found = self.rows(q, v)
         return max(found[n][0] for n in self.leaving) - 2.0 * self.tolerances.closed
+
+
+def _away(here: _Here, resting: NDArray[np.bool_]) -> Floats:
+    """Return the opening accelerations (c,) [m/s²] of the contacts, with resting contacts kept from closing."""
+    bound = np.where(resting, -here.drift, -np.inf)
+    return here.rows @ nearest_velocity(here.mass, here.free, here.rows, bound).velocity + here.drift
 
 
 def _least_change(mass: Floats, rows: Floats, target: Floats) -> Floats:
@@ -356,9 +343,8 @@ def scene_truth(
     first, *others = (_compute(motion, most_events, start) for motion in motions)
     for other in others:
         if len(other.events) != len(first.events):
-            raise SolverError(
-                f"{scene.name}: no reference: {len(first.events)} or {len(other.events)} events, by tolerance"
-            )
+            counts = f"{len(first.events)} or {len(other.events)} events"
+            raise SolverError(f"{scene.name}: no reference: {counts}, by tolerance")
     q, v = first.state(np.linspace(0.0, duration, 10 * _COMPARED))
     sizes = (max(1.0, float(np.abs(q).max())), max(1.0, float(np.abs(v).max())), duration)
     floor = [computations[0].accuracy * size for size in sizes]
@@ -401,25 +387,15 @@ def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
     """Integrate to the next event, or to the end."""
     from scipy.integrate import solve_ivp
 
-    def closing(_time: float, y: Floats) -> float:
-        return motion.closing(y)
-
-    def pushing(_time: float, y: Floats) -> float:
-        return motion.pushing(y)
-
-    def opening(_time: float, y: Floats) -> float:
-        return motion.opening(y)
-
-    found: tuple[Any, ...] = (closing, pushing, opening)
-    for event, direction in zip(found, (-1.0, -1.0, 1.0), strict=True):  # scipy reads these attributes
-        event.terminal, event.direction = True, direction
+    found: list[Any] = []
+    for event, direction in ((motion.closing, -1.0), (motion.pushing, -1.0), (motion.opening, 1.0)):
+        found.append(lambda _time, y, event=event: event(y))
+        found[-1].terminal, found[-1].direction = True, direction  # scipy reads these attributes
     accuracy, longest = motion.tolerances.accuracy, motion.duration / motion.tolerances.steps
     if motion.leaving:  # no step may skip a whole bounce: after a quarter of its time it has 3/4 of its height
         longest = min(longest, 0.25 * motion.flight)
-    solution = solve_ivp(
-        motion.rate, (now, motion.duration), state, "DOP853", rtol=accuracy, atol=accuracy, events=found,
-        dense_output=True, max_step=longest,
-    )  # fmt: skip
+    solution = solve_ivp(motion.rate, (now, motion.duration), state, "DOP853", rtol=accuracy, atol=accuracy,
+                         events=found, dense_output=True, max_step=longest)  # fmt: skip
     if solution.status < 0:
         raise SolverError(f"{motion.scene.name}: no reference after {solution.t[-1]:.4g} s: {solution.message}")
     return solution

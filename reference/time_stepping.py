@@ -7,7 +7,7 @@ module makes both a contact law that runs on every scene.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,16 +29,7 @@ from reference.contact_rows import (
 )
 from reference.free_motion import free_motion
 from reference.one_thread import one_thread
-from reference.rigid_step import (
-    FRICTION_LAWS,
-    SCHEMES,
-    friction_step,
-    nearest_velocity,
-    rigid_step,
-    velocity_bounds,
-)
-
-__all__ = ["RigidConstraints", "nearest_velocity", "rigid_step", "velocity_bounds"]
+from reference.rigid_step import FRICTION_LAWS, SCHEMES, friction_step, rigid_step, velocity_bounds
 
 Floats = NDArray[np.float64]
 
@@ -99,13 +90,7 @@ class RigidConstraints:
     @property
     def settings(self) -> dict[str, Any]:
         """All parameters of a step besides the scene, which gives the coefficients of restitution and friction."""
-        return {
-            "margin": self.margin,
-            "stabilization": self.stabilization,
-            "scheme": self.scheme,
-            "friction": self.friction,
-            "restitution where Newton's law has no solution or gains energy": "Poisson",
-        }
+        return {**asdict(self), "restitution where Newton's law has no solution or gains energy": "Poisson"}
 
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """Do one step (see `iapb.contact.laws.ContactLaw`).
@@ -152,21 +137,18 @@ class RigidConstraints:
         write_contacts(state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt)
         write_impact(state, system, v, mass, impulse, found.jacobian[blows])
         q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt)
-        contact_state = _contact_state(found, step.normal, blows)
+        touches = ((found.gap <= 0.0) | (step.normal > 0.0)).any()
+        contact_state = COLLIDING if blows.any() else RESTING if touches else FREE
         dragging -= damping * step.velocity
         return StepResult(q_plus, v_plus, pressing, dragging, impulse, contact_state)
 
-    def _solve(
-        self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float, found: ContactRows
-    ) -> _Solved:
-        e = _restitution(system, found)
-        classes, table = system.frictions
+    def _solve(self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float,
+               found: ContactRows) -> _Solved:  # fmt: skip
+        e, (classes, table) = _restitution(system, found), system.frictions
         if self.friction == "none" or not table.any():
-            step = rigid_step(
-                mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization, self.scheme
-            )
-            still = np.zeros((len(found.gap), 3))
-            return _Solved(step.velocity, step.impulse, still, np.zeros_like(found.jacobian.T))
+            step = rigid_step(mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization,
+                              self.scheme)  # fmt: skip
+            return _Solved(step.velocity, step.impulse, np.zeros((len(found.gap), 3)), np.zeros_like(found.jacobian.T))
         mu = table[classes[found.geometry.shape_a], classes[found.geometry.shape_b]]
         bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
         tangents, rows = tangent_rows(system, q, found)
@@ -227,9 +209,3 @@ def _blows(mass: Floats, found: ContactRows, impulse: Floats, approach_velocity:
     _, island = connected_components(rows @ np.linalg.solve(mass, rows.T) != 0.0, directed=False)
     struck[pushes] = np.isin(island, island[struck[pushes]])
     return struck
-
-
-def _contact_state(found: ContactRows, impulse: Floats, blows: NDArray[np.bool_]) -> int:
-    if blows.any():
-        return COLLIDING
-    return RESTING if ((found.gap <= 0.0) | (impulse > 0.0)).any() else FREE

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import MissingDependencyError
 from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
-from reference.complementarity.solution import SOLVED_TOLERANCE, Residuals, velocity_scale
+from reference.complementarity.solution import SOLVED_TOLERANCE, Residuals, Solution, velocity_scale
 from reference.complementarity.solvers import solve, solver_names
 
 Floats = NDArray[np.float64]
@@ -42,14 +42,9 @@ class SolverRow:
 
 
 def run_solvers(
-    problems: Iterable[ImpactProblem],
-    solvers: Sequence[str] | None = None,
-    *,
-    tolerance: float = SOLVED_TOLERANCE,
-    repeats: int = 1,
-    longest: float = np.inf,
-    slow: dict[str, float] | None = None,
-    progress: Callable[[str, str], None] | None = None,
+    problems: Iterable[ImpactProblem], solvers: Sequence[str] | None = None, *,
+    tolerance: float = SOLVED_TOLERANCE, repeats: int = 1, longest: float = np.inf,
+    slow: dict[str, float] | None = None, progress: Callable[[str, str], None] | None = None,
 ) -> list[SolverRow]:
     """Solve every problem with every solver of its kind (or with `solvers`); the time is the least of `repeats`.
 
@@ -59,18 +54,31 @@ def run_solvers(
     rows: list[SolverRow] = []
     slow = {} if slow is None else slow
     for problem in problems:
-        names = solvers or solver_names(problem)
-        found = _rows(problem, [name for name in names if name not in slow], tolerance, repeats, progress)
-        slow.update({row.solver: row.seconds for row in found if row.seconds > longest})
-        rows += found + [_unasked(problem, name, slow[name]) for name in names if name in slow
-                         and name not in {row.solver for row in found}]  # fmt: skip
+        asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
+        found: list[Solution] = []
+        missing, left_out = [], []
+        for name in solvers or solver_names(problem):
+            if name in slow:
+                left_out.append((name, "left out", f"left out: {slow[name]:.3g} s for a problem before"))
+                continue
+            if progress is not None:
+                progress(problem.name, name)
+            try:
+                found.append(min((solve(problem, name) for _ in range(repeats)), key=lambda s: s.seconds))
+            except MissingDependencyError as error:
+                missing.append((name, "missing", str(error)))
+        best = min(found, key=lambda s: s.residuals.worst, default=None)
+        for s in found:
+            spread = np.nan
+            if best is not None and s.solved(tolerance):
+                difference = np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0)
+                spread = float(difference / velocity_scale(problem))
+            rows.append(SolverRow(problem.name, problem.size, s.solver, s.verdict(tolerance), s.residuals, s.seconds,
+                                  spread, asymmetry, s.note))  # fmt: skip
+        rows += [SolverRow(problem.name, problem.size, name, verdict, Residuals(), np.nan, np.nan, asymmetry, note)
+                 for name, verdict, note in missing + left_out]  # fmt: skip
+        slow.update({s.solver: s.seconds for s in found if s.seconds > longest})
     return rows
-
-
-def _unasked(problem: ImpactProblem, solver: str, seconds: float) -> SolverRow:
-    asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
-    note = f"left out: {seconds:.3g} s for a problem before"
-    return SolverRow(problem.name, problem.size, solver, "left out", Residuals(), np.nan, np.nan, asymmetry, note)
 
 
 def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str, Floats]:
@@ -87,48 +95,3 @@ def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str,
     best = times.min(axis=0, initial=np.inf)
     ratios = np.where(np.isfinite(times), times / np.where(np.isfinite(best), best, 1.0), np.inf)
     return {name: (ratios[i][:, None] <= factors).mean(axis=0) for i, name in enumerate(names)}
-
-
-def _rows(
-    problem: ImpactProblem,
-    solvers: Sequence[str],
-    tolerance: float,
-    repeats: int,
-    progress: Callable[[str, str], None] | None,
-) -> list[SolverRow]:
-    solutions, missing = {}, {}
-    for name in solvers:
-        if progress is not None:
-            progress(problem.name, name)
-        try:
-            solutions[name] = min((solve(problem, name) for _ in range(repeats)), key=lambda s: s.seconds)
-        except MissingDependencyError as error:
-            missing[name] = str(error)
-    best = min(solutions.values(), key=lambda s: s.residuals.worst, default=None)
-    asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
-    rows = []
-    for name, solution in solutions.items():
-        spread = np.nan
-        if best is not None and solution.solved(tolerance):
-            difference = np.abs(solution.gamma_plus - best.gamma_plus).max(initial=0.0)
-            spread = float(difference / velocity_scale(problem))
-        verdict, judged = solution.verdict(tolerance), solution.residuals
-        rows.append(
-            SolverRow(
-                problem.name,
-                problem.size,
-                name,
-                verdict,
-                judged,
-                solution.seconds,
-                spread,
-                asymmetry,
-                solution.note,
-            )
-        )
-    unknown = Residuals()
-    rows += [
-        SolverRow(problem.name, problem.size, name, "missing", unknown, np.nan, np.nan, asymmetry, note)
-        for name, note in missing.items()
-    ]
-    return rows

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,10 +76,21 @@ def newton_equality(problem: ImpactProblem) -> Outcome:
     SolverError
         Redundant rows with different e contradict each other, so no velocity satisfies all of them.
     """
-    change, impulse, residual = _equality(problem)
+    mass, rows, target = _known(problem.mass_matrix), problem.factor, -problem.offset
+    if not len(rows):
+        return Outcome(_known(problem.velocity), np.zeros(0))
+    cholesky, length = np.linalg.cholesky(mass), np.linalg.norm(rows, axis=1)
+    unit = np.where(length > 0.0, length, 1.0)[:, None]
+    # A = J L⁻ᵀ comes from a triangular solve with a relative error up to n ε κ(L). A smaller singular value may be
+    # rounding error of dependent rows, and dividing by it would turn noise into impulses.
+    dependent = float(max(rows.shape) * np.finfo(np.float64).eps * np.linalg.cond(cholesky))
+    change = np.linalg.lstsq(rows / unit, target / unit[:, 0], rcond=dependent)[0]
+    shortest = float(unit.min() / unit.max())  # the least norm of p needs the rows without scaling
+    impulse = np.linalg.lstsq(rows.T, change, rcond=dependent * shortest)[0]
+    residual = float(np.abs(rows @ change - target).max() / (np.abs(target).max() or 1.0))
     if residual > LAW_TOLERANCE:
         raise SolverError(f"contradicting equalities on redundant contacts: residual {residual:.1e}")
-    return Outcome(_known(problem.velocity) + change, impulse, residual)
+    return Outcome(_known(problem.velocity) + np.linalg.solve(cholesky.T, change), impulse, residual)
 
 
 def coulomb_ncp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
@@ -117,89 +127,25 @@ def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> t
     raise SolverError("; ".join(said))
 
 
-def _equality(problem: ImpactProblem) -> tuple[Floats, Floats, float]:
-    """Return Δv, p and residual of the least velocity change, in the kinetic metric, that satisfies all equalities."""
-    mass = _known(problem.mass_matrix)
-    rows, cholesky = problem.factor, np.linalg.cholesky(mass)
-    target = -problem.offset
-    if not len(rows):
-        return np.zeros(len(mass)), np.zeros(0), 0.0
-    length = np.linalg.norm(rows, axis=1)
-    unit = np.where(length > 0.0, length, 1.0)[:, None]
-    dependent = _dependent(rows, cholesky)
-    change = np.linalg.lstsq(rows / unit, target / unit[:, 0], rcond=dependent)[0]
-    shortest = float(unit.min() / unit.max())  # the least norm of p needs the rows without scaling
-    impulse = np.linalg.lstsq(rows.T, change, rcond=dependent * shortest)[0]
-    scale = np.abs(target).max() or 1.0
-    residual = float(np.abs(rows @ change - target).max() / scale)
-    return np.linalg.solve(cholesky.T, change), impulse, residual
-
-
-def _dependent(rows: Floats, cholesky: NDArray[Any]) -> float:
-    """Return the share of the largest singular value of the unit rows below which a singular value counts as zero.
-
-    A = J L⁻ᵀ comes from a triangular solve with a relative error up to n ε κ(L). A smaller singular value may be
-    rounding error of dependent rows, and dividing by it would turn noise into impulses.
-    """
-    return float(max(rows.shape) * np.finfo(np.float64).eps * np.linalg.cond(cholesky))
-
-
 def _known(mechanics: Floats | None) -> Floats:
     if mechanics is None:
         raise ArgumentError("problem", "without mechanics", "a problem made by ImpactProblem.from_impact")
     return mechanics
 
 
-LAWS: dict[str, Law] = {
-    law.name: law
-    for law in (
-        Law(
-            "newton_lcp",
-            "0 <= p ⟂ gamma_plus + E gamma_minus >= 0",
-            "Moreau 1988; Glocker and Pfeiffer 1995",
-            "equal e, or all given contacts approach (gamma_minus <= 0)",
-            True,
-            newton_lcp,
-        ),
-        Law(
-            "poisson",
-            "0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e - E p_c ⟂ gamma_plus >= 0",
-            "Glocker and Pfeiffer 1995; Anitescu and Potra 1997",
-            "any E in [0, 1], any gamma_minus",
-            True,
-            poisson,
-        ),
-        Law(
-            "newton_equality",
-            "gamma_plus = -E gamma_minus, p of either sign",
-            "Constantinescu, Salcudean, Croft 2005, (15)-(21)",
-            "one e for all contacts",
-            True,
-            newton_equality,
-        ),
-        Law(
-            "per_body_equality",
-            "newton_equality on the rows of each body apart (`per_body_rows`)",
-            "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
-            "one e for all contacts; momentum is not conserved at self-collisions",
-            True,
-            newton_equality,
-        ),
-        Law(
-            "coulomb_ncp",
-            "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",
-            "Moreau 1988; de Saxcé and Feng 1998",
-            "e = 0; with e > 0 it can gain energy (Kane and Levinson 1985)",
-            True,
-            coulomb_ncp,
-        ),
-        Law(
-            "coulomb_ccp",
-            "K ∋ p ⟂ u ∈ K*, u as in coulomb_ncp; sliding contacts open at mu |u_T|",
-            "Anitescu and Tasora 2010",
-            "e = 0; with e > 0 it can gain energy",
-            True,
-            coulomb_ccp,
-        ),
-    )
-}
+LAWS: dict[str, Law] = {law.name: law for law in (
+    Law("newton_lcp", "0 <= p ⟂ gamma_plus + E gamma_minus >= 0", "Moreau 1988; Glocker and Pfeiffer 1995",
+        "equal e, or all given contacts approach (gamma_minus <= 0)", True, newton_lcp),
+    Law("poisson", "0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e - E p_c ⟂ gamma_plus >= 0",
+        "Glocker and Pfeiffer 1995; Anitescu and Potra 1997", "any E in [0, 1], any gamma_minus", True, poisson),
+    Law("newton_equality", "gamma_plus = -E gamma_minus, p of either sign",
+        "Constantinescu, Salcudean, Croft 2005, (15)-(21)", "one e for all contacts", True, newton_equality),
+    Law("per_body_equality", "newton_equality on the rows of each body apart (`per_body_rows`)",
+        "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
+        "one e for all contacts; momentum is not conserved at self-collisions", True, newton_equality),
+    Law("coulomb_ncp", "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",
+        "Moreau 1988; de Saxcé and Feng 1998", "e = 0; with e > 0 it can gain energy (Kane and Levinson 1985)", True,
+        coulomb_ncp),
+    Law("coulomb_ccp", "K ∋ p ⟂ u ∈ K*, u as in coulomb_ncp; sliding contacts open at mu |u_T|",
+        "Anitescu and Tasora 2010", "e = 0; with e > 0 it can gain energy", True, coulomb_ccp),
+)}  # fmt: skip

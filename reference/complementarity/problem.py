@@ -59,54 +59,28 @@ class ImpactProblem:
 
     @classmethod
     def from_impact(
-        cls,
-        mass_matrix: ArrayLike,
-        contact_jacobian: ArrayLike,
-        velocity: ArrayLike,
-        restitution: ArrayLike,
-        friction: ArrayLike | None = None,
-        *,
-        contact_size: int | None = None,
-        relaxed: bool = False,
-        bilateral: ArrayLike | None = None,
-        name: str = "",
+        cls, mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: ArrayLike,
+        friction: ArrayLike | None = None, *, contact_size: int | None = None, relaxed: bool = False,
+        bilateral: ArrayLike | None = None, name: str = "",
     ) -> ImpactProblem:
         """Return the problem of an impact of velocity v (d,) on rows J (n, d) with mass matrix M (d, d)."""
-        mass = _finite("mass_matrix", mass_matrix, 2)
-        jacobian = _finite("contact_jacobian", contact_jacobian, 2)
-        v = _finite("velocity", velocity, 1)
-        _check_shapes(mass, jacobian, v)
-        size = contact_size or (1 if friction is None else 3)
+        v = _array("velocity", velocity, (None,))
+        mass = _array("mass_matrix", mass_matrix, (len(v), len(v)))
+        jacobian = _array("contact_jacobian", contact_jacobian, (None, len(v)))
         factor = _mechanical_factor(mass, jacobian)
-        coefficients = _per_contact("restitution", restitution, len(jacobian), size)
-        mu = None if friction is None else _per_contact("friction", friction, len(jacobian), size)
-        gamma, w = jacobian @ v, factor @ factor.T
-        joints = _joints(bilateral, len(coefficients))
-        return cls(w, gamma, coefficients, mu, size, relaxed, name, mass, jacobian, v, joints)
+        contacts = _contacts(len(jacobian), contact_size, restitution, friction, relaxed, bilateral, name)
+        return cls(factor @ factor.T, jacobian @ v, **contacts, mass_matrix=mass, contact_jacobian=jacobian, velocity=v)
 
     @classmethod
     def from_delassus(
-        cls,
-        delassus: ArrayLike,
-        gamma_minus: ArrayLike,
-        restitution: ArrayLike = 0.0,
-        friction: ArrayLike | None = None,
-        *,
-        contact_size: int | None = None,
-        relaxed: bool = False,
-        bilateral: ArrayLike | None = None,
-        name: str = "",
+        cls, delassus: ArrayLike, gamma_minus: ArrayLike, restitution: ArrayLike = 0.0,
+        friction: ArrayLike | None = None, *, contact_size: int | None = None, relaxed: bool = False,
+        bilateral: ArrayLike | None = None, name: str = "",
     ) -> ImpactProblem:
         """Return the problem of W (n, n) and gamma_minus (n,); with e = 0 it is the LCP (W, gamma_minus)."""
-        w = _finite("delassus", delassus, 2)
-        gamma = _finite("gamma_minus", gamma_minus, 1)
-        if w.shape != (len(gamma), len(gamma)):
-            raise ArgumentError("delassus", w.shape, f"shape ({len(gamma)}, {len(gamma)}), as gamma_minus")
-        size = contact_size or (1 if friction is None else 3)
-        coefficients = _per_contact("restitution", restitution, len(gamma), size)
-        mu = None if friction is None else _per_contact("friction", friction, len(gamma), size)
-        joints = _joints(bilateral, len(coefficients))
-        return cls(w, gamma, coefficients, mu, size, relaxed, name, bilateral=joints)
+        gamma = _array("gamma_minus", gamma_minus, (None,))
+        w = _array("delassus", delassus, (len(gamma), len(gamma)))
+        return cls(w, gamma, **_contacts(len(gamma), contact_size, restitution, friction, relaxed, bilateral, name))
 
     @property
     def two_sided(self) -> NDArray[np.bool_]:
@@ -138,10 +112,8 @@ class ImpactProblem:
     @cached_property
     def asymmetry(self) -> float:
         """Largest |W - Wᵀ| relative to the largest |W|; a Delassus matrix is symmetric up to rounding."""
-        largest = np.abs(self.delassus).max(initial=0.0)
-        if largest == 0.0:
-            return 0.0
-        return float(np.abs(self.delassus - self.delassus.T).max() / largest)
+        largest = float(np.abs(self.delassus).max(initial=0.0)) or 1.0
+        return float(np.abs(self.delassus - self.delassus.T).max(initial=0.0) / largest)
 
     @cached_property
     def factor(self) -> Floats:
@@ -156,7 +128,12 @@ class ImpactProblem:
             return _mechanical_factor(self.mass_matrix, self.contact_jacobian)
         if self.asymmetry > SYMMETRY_TOLERANCE:
             raise SolverError(f"refused: W is asymmetric (relative {self.asymmetry:.1e}), not convex")
-        return _eigen_factor(self.delassus)
+        eigenvalues, vectors = np.linalg.eigh(0.5 * (self.delassus + self.delassus.T))
+        largest = np.abs(eigenvalues).max(initial=0.0)
+        if eigenvalues.min(initial=0.0) < -INDEFINITE_TOLERANCE * largest:
+            ratio = eigenvalues.min() / largest
+            raise SolverError(f"refused: W is indefinite (relative eigenvalue {ratio:.1e}), not convex")
+        return np.asarray(vectors * np.sqrt(np.clip(eigenvalues, 0.0, None)))
 
     def contact_velocity(self, impulse: Floats) -> Floats:
         """Return w = W p + b (n,), the velocity complementary to the impulse, before Coulomb's shift [m/s]."""
@@ -173,43 +150,38 @@ class ImpactProblem:
         return self.velocity + np.linalg.solve(self.mass_matrix, self.contact_jacobian.T @ impulse)
 
 
-def _finite(argument: str, value: Any, dimensions: int) -> Floats:
+def _array(argument: str, value: Any, shape: tuple[int | None, ...]) -> Floats:
+    """Return finite numbers of this shape, in which None is any length."""
     array = np.array(value, dtype=np.float64)
-    if array.ndim != dimensions:
-        raise ArgumentError(argument, array.shape, f"an array of {dimensions} dimensions")
+    if array.ndim != len(shape) or any(b not in (None, a) for a, b in zip(array.shape, shape, strict=True)):
+        raise ArgumentError(argument, array.shape, f"shape {shape}".replace("None", "n"))
     if not np.isfinite(array).all():
         raise ArgumentError(argument, value, "finite numbers")
     return array
 
 
-def _check_shapes(mass: Floats, jacobian: Floats, velocity: Floats) -> None:
-    d = len(velocity)
-    if mass.shape != (d, d):
-        raise ArgumentError("mass_matrix", mass.shape, f"shape ({d}, {d}), as velocity")
-    if jacobian.shape[1] != d:
-        raise ArgumentError("contact_jacobian", jacobian.shape, f"{d} columns, as velocity")
-
-
-def _per_contact(argument: str, value: ArrayLike, components: int, size: int) -> Floats:
-    """Return one coefficient per contact from a scalar or an array, checked against its range."""
-    if components % size:
-        raise ArgumentError("contact_size", size, f"a divisor of the {components} rows")
-    array = np.array(value, dtype=np.float64)
-    if array.ndim > 1 or (array.ndim == 1 and len(array) != components // size):
-        raise ArgumentError(argument, array.shape, f"a scalar or shape ({components // size},)")
-    upper = 1.0 if argument == "restitution" else np.inf
-    if not ((array >= 0.0) & (array <= upper) & np.isfinite(array)).all():
-        raise ArgumentError(argument, value, "values in [0, 1]" if upper == 1.0 else "finite values >= 0")
-    return np.ascontiguousarray(np.broadcast_to(array, components // size))
-
-
-def _joints(bilateral: ArrayLike | None, blocks: int) -> NDArray[np.bool_] | None:
-    if bilateral is None:
-        return None
-    joints = np.array(bilateral, dtype=np.bool_)
-    if joints.shape != (blocks,):
-        raise ArgumentError("bilateral", bilateral, f"shape ({blocks},)")
-    return joints
+def _contacts(
+    rows: int, contact_size: int | None, restitution: ArrayLike, friction: ArrayLike | None, relaxed: bool,
+    bilateral: ArrayLike | None, name: str,
+) -> dict[str, Any]:
+    """Return the fields of an ImpactProblem that describe its contacts, each coefficient as an array (k,)."""
+    size = contact_size or (1 if friction is None else 3)
+    if rows % size:
+        raise ArgumentError("contact_size", size, f"a divisor of the {rows} rows")
+    found: dict[str, Any] = {"contact_size": size, "relaxed": relaxed, "name": name}
+    for argument, value, upper in (("restitution", restitution, 1.0), ("friction", friction, np.inf)):
+        if value is not None:
+            array = np.array(value, dtype=np.float64)
+            if array.shape not in ((), (rows // size,)):
+                raise ArgumentError(argument, array.shape, f"a scalar or shape ({rows // size},)")
+            if not ((array >= 0.0) & (array <= upper) & np.isfinite(array)).all():
+                raise ArgumentError(argument, value, "values in [0, 1]" if upper == 1.0 else "finite values >= 0")
+            found[argument] = np.ascontiguousarray(np.broadcast_to(array, rows // size))
+    if bilateral is not None:
+        found["bilateral"] = np.array(bilateral, dtype=np.bool_)
+        if found["bilateral"].shape != (rows // size,):
+            raise ArgumentError("bilateral", bilateral, f"shape ({rows // size},)")
+    return found
 
 
 def _mechanical_factor(mass: Floats, jacobian: Floats) -> Floats:
@@ -219,12 +191,3 @@ def _mechanical_factor(mass: Floats, jacobian: Floats) -> Floats:
     except np.linalg.LinAlgError:
         raise ArgumentError("mass_matrix", mass, "a symmetric positive definite matrix") from None
     return np.linalg.solve(cholesky, jacobian.T).T
-
-
-def _eigen_factor(delassus: Floats) -> Floats:
-    eigenvalues, vectors = np.linalg.eigh(0.5 * (delassus + delassus.T))
-    largest = np.abs(eigenvalues).max(initial=0.0)
-    if eigenvalues.min(initial=0.0) < -INDEFINITE_TOLERANCE * largest:
-        ratio = eigenvalues.min() / largest
-        raise SolverError(f"refused: W is indefinite (relative eigenvalue {ratio:.1e}), not convex")
-    return vectors * np.sqrt(np.clip(eigenvalues, 0.0, None))

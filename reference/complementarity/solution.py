@@ -79,11 +79,8 @@ class Solution:
     @cached_property
     def residuals(self) -> Residuals:
         """Residuals recomputed from the problem; all infinite without a usable impulse."""
-        if self.impulse is None or self.impulse.shape != self.problem.gamma_minus.shape:
-            return Residuals()
-        if not np.isfinite(self.impulse).all():
-            return Residuals()
-        return residuals(self.problem, self.impulse)
+        fits = self.impulse is not None and self.impulse.shape == self.problem.gamma_minus.shape
+        return residuals(self.problem, self.answer()) if fits and np.isfinite(self.answer()).all() else Residuals()
 
     def solved(self, tolerance: float = SOLVED_TOLERANCE) -> bool:
         """Whether every recomputed residual is at most `tolerance` of the velocity scale."""
@@ -115,12 +112,6 @@ def velocity_scale(problem: ImpactProblem) -> float:
     return float(np.abs(problem.offset).max(initial=0.0)) or 1.0
 
 
-def impulse_scale(problem: ImpactProblem) -> Floats:
-    """Return per contact (k,) the largest |W| entry of its rows [1/kg], which converts an impulse into a velocity."""
-    scale = np.abs(problem.delassus).max(axis=1, initial=0.0).reshape(-1, problem.contact_size).max(axis=1)
-    return np.where(scale > 0.0, scale, 1.0)
-
-
 def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
     """Return the residuals of `impulse` (n,), recomputed from the problem (scale: `velocity_scale`)."""
     if problem.size == 0:
@@ -129,16 +120,18 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
     w = problem.contact_velocity(impulse).reshape(-1, size) / scale
     if problem.friction is not None and not problem.relaxed:
         w = de_saxce_shift(w, np.where(problem.two_sided, 0.0, mu))
-    p = impulse_scale(problem)[:, None] * impulse.reshape(-1, size) / scale
+    # per contact the largest |W| entry of its rows [1/kg] converts an impulse into a velocity
+    largest = np.abs(problem.delassus).max(axis=1).reshape(-1, size).max(axis=1)
+    p = np.where(largest > 0.0, largest, 1.0)[:, None] * impulse.reshape(-1, size) / scale
     joints = problem.two_sided  # cone: the whole line, dual cone: zero
     natural = np.where(joints[:, None], w, p - project_on_cone(p - w, mu))
     product = np.abs(np.einsum("ij,ij->i", p, w)) / np.maximum(1.0, np.linalg.norm(p, axis=1))
+    # the distance from the dual cone is |proj_K(-w)| by Moreau's decomposition
+    outside, penetrating = p - project_on_cone(p, mu), np.where(joints[:, None], w, project_on_cone(-w, mu))
     return Residuals(
-        float(np.where(joints, 0.0, distance_to_cone(p, mu)).max()),
-        float(np.where(joints, np.linalg.norm(w, axis=1), distance_to_dual_cone(w, mu)).max()),
-        float(product.max()),
-        float(np.abs(natural).max()),
-    )
+        float(np.where(joints, 0.0, np.linalg.norm(outside, axis=1)).max()),
+        float(np.linalg.norm(penetrating, axis=1).max()), float(product.max()), float(np.abs(natural).max()),
+    )  # fmt: skip
 
 
 def project_on_cone(blocks: Floats, friction: Floats) -> Floats:
@@ -150,16 +143,6 @@ def project_on_cone(blocks: Floats, friction: Floats) -> Floats:
     shrink = np.divide(friction * height, tangent, out=np.zeros_like(tangent), where=tangent > 0.0)
     projected = np.column_stack([height, shrink[:, None] * blocks[:, 1:]])
     return np.where(inside[:, None], blocks, projected)
-
-
-def distance_to_cone(blocks: Floats, friction: Floats) -> Floats:
-    """Return the distance (k,) of each row of `blocks` from Coulomb's cone."""
-    return np.linalg.norm(blocks - project_on_cone(blocks, friction), axis=1)
-
-
-def distance_to_dual_cone(blocks: Floats, friction: Floats) -> Floats:
-    """Return the distance (k,) of each row from the dual cone, |proj_K(-x)| by Moreau's decomposition."""
-    return np.linalg.norm(project_on_cone(-blocks, friction), axis=1)
 
 
 def de_saxce_shift(relative_velocity: Floats, friction: Floats) -> Floats:

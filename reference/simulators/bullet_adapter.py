@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from math import sqrt
 from typing import Any
 
-import numpy as np
-
-from iapb.errors import MissingDependencyError
 from reference.simulators.scene import Cuboid, FixedScene, Quaternion, Sphere, Vector
-from reference.simulators.simulator import Settings
+from reference.simulators.simulator import Settings, engine
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 DEFAULT_STEP = 1.0 / 240.0  # [s]
@@ -24,9 +22,7 @@ class Bullet:
 
     def version(self) -> str:
         """Return the installed version."""
-        _pybullet()
-        from importlib.metadata import version
-
+        engine("pybullet")
         return version("pybullet")
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
@@ -48,27 +44,22 @@ class Bullet:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `stepSimulation`."""
-        bullet = _pybullet()
+        bullet = engine("pybullet")
         world = bullet.connect(bullet.DIRECT)
         try:
             bodies = _build(bullet, world, scene, settings, step)
-            record, stride = Recorder(), steps_between_samples(step)
-            for k in range(round(duration / step)):
-                if k % stride == 0:
-                    _keep(bullet, world, record, k * step, bodies)
-                bullet.stepSimulation(physicsClientId=world)
-            _keep(bullet, world, record, round(duration / step) * step, bodies)
+            record, stride, last = Recorder(), steps_between_samples(step), round(duration / step)
+            for k in range(last + 1):
+                if k % stride == 0 or k == last:
+                    places = (bullet.getBasePositionAndOrientation(body, physicsClientId=world) for body in bodies)
+                    speeds = (bullet.getBaseVelocity(body, physicsClientId=world) for body in bodies)
+                    touching = len(bullet.getContactPoints(physicsClientId=world))
+                    record.add(k * step, *zip(*places, strict=True), *zip(*speeds, strict=True), touching)
+                if k < last:
+                    bullet.stepSimulation(physicsClientId=world)
         finally:
             bullet.disconnect(world)
         return record.trajectory()
-
-
-def _pybullet() -> Any:
-    try:
-        import pybullet
-    except ImportError as error:
-        raise MissingDependencyError("pybullet", "The Bullet adapter", "pip install 'iapb[peers]'") from error
-    return pybullet
 
 
 def _build(bullet: Any, world: int, scene: FixedScene, settings: Settings, step: float) -> list[int]:
@@ -80,10 +71,10 @@ def _build(bullet: Any, world: int, scene: FixedScene, settings: Settings, step:
     )  # fmt: skip
     bullet.setGravity(*scene.gravity, physicsClientId=world)
     for wall in scene.obstacles:
-        _body(bullet, world, 0.0, (Cuboid(wall.size),), wall.center, wall.orientation, settings)
+        _body(bullet, world, 0.0, (Cuboid(wall.size),), wall.center, wall.orientation, given)
     bodies = []
     for body in scene.bodies:
-        made = _body(bullet, world, body.mass, body.shapes, body.position, body.orientation, settings)
+        made = _body(bullet, world, body.mass, body.shapes, body.position, body.orientation, given)
         bullet.changeDynamics(made, -1, localInertiaDiagonal=body.inertia, physicsClientId=world)
         bullet.resetBaseVelocity(made, body.velocity, body.spin, physicsClientId=world)
         bodies.append(made)
@@ -91,11 +82,18 @@ def _build(bullet: Any, world: int, scene: FixedScene, settings: Settings, step:
 
 
 def _body(bullet: Any, world: int, mass: float, shapes: tuple[Sphere | Cuboid, ...], position: Vector,
-          orientation: Quaternion, settings: Settings) -> int:  # fmt: skip
-    made: int = bullet.createMultiBody(
-        mass, _collision_shape(bullet, world, shapes), -1, position, orientation, physicsClientId=world,
-    )  # fmt: skip
-    given = settings.options
+          orientation: Quaternion, given: Any) -> int:  # fmt: skip
+    if isinstance(shapes[0], Sphere):
+        shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=shapes[0].radius, physicsClientId=world)
+    else:
+        boxes = [box for box in shapes if isinstance(box, Cuboid)]
+        halves, types = [[0.5 * length for length in box.size] for box in boxes], [bullet.GEOM_BOX] * len(boxes)
+        if len(boxes) == 1:
+            shape = bullet.createCollisionShape(types[0], halfExtents=halves[0], physicsClientId=world)
+        else:
+            shape = bullet.createCollisionShapeArray(shapeTypes=types, halfExtents=halves, physicsClientId=world,
+                                                     collisionFramePositions=[box.center for box in boxes])  # fmt: skip
+    made: int = bullet.createMultiBody(mass, shape, -1, position, orientation, physicsClientId=world)
     bullet.changeDynamics(
         made, -1, restitution=given["restitution of each body"], lateralFriction=0.0, rollingFriction=0.0,
         spinningFriction=0.0, linearDamping=given["linearDamping"], angularDamping=given["angularDamping"],
@@ -103,27 +101,3 @@ def _body(bullet: Any, world: int, mass: float, shapes: tuple[Sphere | Cuboid, .
         activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=world,
     )  # fmt: skip
     return made
-
-
-def _collision_shape(bullet: Any, world: int, shapes: tuple[Sphere | Cuboid, ...]) -> int:
-    if len(shapes) == 1 and isinstance(shapes[0], Sphere):
-        made: int = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=shapes[0].radius, physicsClientId=world)
-        return made
-    boxes = [shape for shape in shapes if isinstance(shape, Cuboid)]
-    halves = [[0.5 * length for length in box.size] for box in boxes]
-    if len(boxes) == 1:
-        made = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=halves[0], physicsClientId=world)
-        return made
-    made = bullet.createCollisionShapeArray(
-        shapeTypes=[bullet.GEOM_BOX] * len(boxes), halfExtents=halves,
-        collisionFramePositions=[box.center for box in boxes], physicsClientId=world,
-    )  # fmt: skip
-    return made
-
-
-def _keep(bullet: Any, world: int, record: Recorder, time: float, bodies: list[int]) -> None:
-    places = [bullet.getBasePositionAndOrientation(body, physicsClientId=world) for body in bodies]
-    speeds = [bullet.getBaseVelocity(body, physicsClientId=world) for body in bodies]
-    position, turn = (np.array(part) for part in zip(*places, strict=True))
-    velocity, spin = (np.array(part) for part in zip(*speeds, strict=True))
-    record.add(time, position, turn, velocity, spin, len(bullet.getContactPoints(physicsClientId=world)))

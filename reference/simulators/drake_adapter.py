@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from iapb.errors import MissingDependencyError
-from reference.simulators.scene import Cuboid, FixedScene, RigidBody, Sphere
-from reference.simulators.simulator import Settings, viscous_dissipation_for
+from reference.simulators.scene import Cuboid, FixedScene, Quaternion, RigidBody, Sphere, Vector
+from reference.simulators.simulator import Settings, engine, viscous_dissipation_for
 from reference.simulators.trajectory import SAMPLE_INTERVAL, Recorder, Trajectory
 
 STEP = 1e-3  # [s] its default for discrete plants
@@ -31,9 +31,7 @@ class Drake:
 
     def version(self) -> str:
         """Return the installed version."""
-        _pydrake()
-        from importlib.metadata import version
-
+        engine("pydrake.all", "drake")
         return version("drake")
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
@@ -56,49 +54,72 @@ class Drake:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `Simulator.AdvanceTo`."""
-        drake = _pydrake()
+        drake, given = engine("pydrake.all", "drake"), settings.options
         plant, diagram, bodies = _build(drake, scene, settings, step)
         simulator = drake.Simulator(diagram)
-        if settings.options["mode"] == CONTINUOUS:
+        if given["mode"] == CONTINUOUS:
             config = drake.SimulatorConfig(integration_scheme="runge_kutta3", max_step_size=step,
-                                           accuracy=float(settings.options["accuracy"]))  # fmt: skip
+                                           accuracy=float(given["accuracy"]))  # fmt: skip
             drake.ApplySimulatorConfig(config, simulator)
         context = plant.GetMyContextFromRoot(simulator.get_mutable_context())
-        _start(drake, plant, context, scene, bodies)
+        for body, made in zip(scene.bodies, bodies, strict=True):
+            plant.SetFreeBodyPose(context, made, _pose(drake, body.position, body.orientation))
+            speed = drake.SpatialVelocity(np.array(body.spin), np.array(body.velocity))
+            plant.SetFreeBodySpatialVelocity(context, made, speed)
         simulator.Initialize()
         record, interval = Recorder(), max(step, SAMPLE_INTERVAL)
         for k in range(round(duration / interval) + 1):
             simulator.AdvanceTo(k * interval)
-            _keep(plant, context, record, k * interval, bodies)
+            places = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
+            speeds = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
+            wxyz = np.array([place.rotation().ToQuaternion().wxyz() for place in places])
+            record.add(k * interval, np.array([place.translation() for place in places]), wxyz[:, [1, 2, 3, 0]],
+                       np.array([speed.translational() for speed in speeds]),
+                       np.array([speed.rotational() for speed in speeds]),
+                       plant.get_contact_results_output_port().Eval(context).num_point_pair_contacts())  # fmt: skip
         return record.trajectory()
 
 
-def _pydrake() -> Any:
-    try:
-        import pydrake.all as drake
-    except ImportError as error:
-        raise MissingDependencyError("drake", "The Drake adapter", "pip install 'iapb[peers]'") from error
-    return drake
-
-
 def _build(drake: Any, scene: FixedScene, settings: Settings, step: float) -> tuple[Any, Any, list[Any]]:
-    """Return plant, diagram and bodies."""
-    builder = drake.DiagramBuilder()
-    time_step = 0.0 if settings.options["mode"] == CONTINUOUS else step
+    """Return plant, diagram and bodies; a frictionless contact has two equal springs in series."""
+    builder, given = drake.DiagramBuilder(), settings.options
+    time_step = 0.0 if given["mode"] == CONTINUOUS else step
     plant, geometry = drake.AddMultibodyPlantSceneGraph(builder, time_step)
     if time_step:
         plant.set_discrete_contact_approximation(drake.DiscreteContactApproximation.kSap)
-    if "sap_near_rigid_threshold" in settings.options:
-        plant.set_sap_near_rigid_threshold(float(settings.options["sap_near_rigid_threshold"]))
+    if "sap_near_rigid_threshold" in given:
+        plant.set_sap_near_rigid_threshold(float(given["sap_near_rigid_threshold"]))
     plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
-    material = _material(drake, settings)
+    material, stiffness = drake.ProximityProperties(), given.get("point_contact_stiffness")
+    drake.AddContactMaterial(given.get("hunt_crossley_dissipation"), None if stiffness is None else 2.0 * stiffness,
+                             drake.CoulombFriction(0.0, 0.0), material)  # fmt: skip
+    if "relaxation_time" in given:
+        material.AddProperty("material", "relaxation_time", given["relaxation_time"])
     for wall in scene.obstacles:
-        x, y, z, w = wall.orientation
-        place = drake.RigidTransform(drake.Quaternion(w, x, y, z), np.array(wall.center))
+        place = _pose(drake, wall.center, wall.orientation)
         plant.RegisterCollisionGeometry(plant.world_body(), place, drake.Box(*wall.size), wall.name, material)
-    balls, boxes = drake.GeometrySet(), drake.GeometrySet()
-    radius, others = float(settings.options["corner radius"]), len(scene.bodies) > 1
-    bodies = [_add(drake, plant, body, material, radius, others, balls, boxes) for body in scene.bodies]
+    balls, boxes, radius = drake.GeometrySet(), drake.GeometrySet(), float(given["corner radius"])
+    bodies = []
+    for body in scene.bodies:
+        inertia = drake.SpatialInertia(body.mass, np.zeros(3),
+                                       drake.UnitInertia(*(moment / body.mass for moment in body.inertia)))  # fmt: skip
+        made = plant.AddRigidBody(body.name, inertia)
+        bodies.append(made)
+
+        def register(shape: Any, center: Any, name: str, body: RigidBody = body, made: Any = made) -> Any:
+            place = drake.RigidTransform(np.array(center))
+            return plant.RegisterCollisionGeometry(made, place, shape, f"{body.name} {name}", material)
+
+        # a box has small balls at its corners and, if there are other bodies, also its faces
+        for number, shape in enumerate(body.shapes):
+            if isinstance(shape, Sphere):
+                register(drake.Sphere(shape.radius), shape.center, f"ball {number}")
+                continue
+            for sign in product((-1.0, 1.0), repeat=3):
+                corner = np.array(shape.center) + (0.5 * np.array(shape.size) - radius) * np.array(sign)
+                balls.Add(register(drake.Sphere(radius), corner, f"corner {number} {sign}"))
+            if len(scene.bodies) > 1:
+                boxes.Add(register(drake.Box(*shape.size), shape.center, f"box {number}"))
     plant.Finalize()
     if any(isinstance(shape, Cuboid) for body in scene.bodies for shape in body.shapes):
         rules = drake.CollisionFilterDeclaration().ExcludeWithin(balls).ExcludeWithin(boxes)
@@ -106,57 +127,6 @@ def _build(drake: Any, scene: FixedScene, settings: Settings, step: float) -> tu
     return plant, builder.Build(), bodies
 
 
-def _material(drake: Any, settings: Settings) -> Any:
-    """Return a frictionless material; a contact has two equal springs in series."""
-    given, properties = settings.options, drake.ProximityProperties()
-    stiffness = given.get("point_contact_stiffness")
-    drake.AddContactMaterial(
-        given.get("hunt_crossley_dissipation"), None if stiffness is None else 2.0 * float(stiffness),
-        drake.CoulombFriction(0.0, 0.0), properties,
-    )  # fmt: skip
-    if "relaxation_time" in given:
-        properties.AddProperty("material", "relaxation_time", given["relaxation_time"])
-    return properties
-
-
-def _add(drake: Any, plant: Any, body: RigidBody, material: Any, radius: float, others: bool, balls: Any,
-         boxes: Any) -> Any:  # fmt: skip
-    """Add a body. A box has small balls at its corners and, if there are other bodies, also its faces."""
-    unit = [moment / body.mass for moment in body.inertia]
-    inertia = drake.SpatialInertia(body.mass, np.zeros(3), drake.UnitInertia(*unit))
-    made = plant.AddRigidBody(body.name, inertia)
-
-    def register(shape: Any, center: Any, name: str) -> Any:
-        place = drake.RigidTransform(np.array(center))
-        return plant.RegisterCollisionGeometry(made, place, shape, f"{body.name} {name}", material)
-
-    for number, shape in enumerate(body.shapes):
-        if isinstance(shape, Sphere):
-            register(drake.Sphere(shape.radius), shape.center, f"ball {number}")
-            continue
-        reach = 0.5 * np.array(shape.size) - radius
-        for sign in product((-1.0, 1.0), repeat=3):
-            corner = np.array(shape.center) + reach * np.array(sign)
-            balls.Add(register(drake.Sphere(radius), corner, f"corner {number} {sign}"))
-        if others:
-            boxes.Add(register(drake.Box(*shape.size), shape.center, f"box {number}"))
-    return made
-
-
-def _start(drake: Any, plant: Any, context: Any, scene: FixedScene, bodies: list[Any]) -> None:
-    for body, made in zip(scene.bodies, bodies, strict=True):
-        x, y, z, w = body.orientation
-        place = drake.RigidTransform(drake.Quaternion(w, x, y, z), np.array(body.position))
-        plant.SetFreeBodyPose(context, made, place)
-        speed = drake.SpatialVelocity(np.array(body.spin), np.array(body.velocity))
-        plant.SetFreeBodySpatialVelocity(context, made, speed)
-
-
-def _keep(plant: Any, context: Any, record: Recorder, time: float, bodies: list[Any]) -> None:
-    places = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
-    speeds = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
-    wxyz = np.array([place.rotation().ToQuaternion().wxyz() for place in places])
-    contacts = plant.get_contact_results_output_port().Eval(context).num_point_pair_contacts()
-    record.add(time, np.array([place.translation() for place in places]), wxyz[:, [1, 2, 3, 0]],
-               np.array([speed.translational() for speed in speeds]),
-               np.array([speed.rotational() for speed in speeds]), contacts)  # fmt: skip
+def _pose(drake: Any, position: Vector, orientation: Quaternion) -> Any:
+    x, y, z, w = orientation
+    return drake.RigidTransform(drake.Quaternion(w, x, y, z), np.array(position))

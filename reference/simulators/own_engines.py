@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from iapb.contact.laws import ContactLaw
 from iapb.errors import IapbError
 from iapb.scene import Scene, scene_from_text
 from iapb.simulation import simulate
-from reference.simulators.scene import Cuboid, FixedScene, Floats, RigidBody, Sphere, rotation
+from reference.simulators.scene import Cuboid, FixedScene, Floats, Sphere, rotation
 from reference.simulators.simulator import Settings
 from reference.simulators.trajectory import Trajectory, steps_between_samples
 from reference.time_stepping import RigidConstraints
@@ -30,85 +31,65 @@ class ImpulseAugmentedEngine:
 
     def version(self) -> str:
         """Our own."""
-        return _own_version()
+        return version("iapb")
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the defaults of a scene: implicit contact whose stiffness follows from weights and sizes."""
         return Settings(step or STEP, {"forces": "implicit"})
 
-    def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
-        """Simulate with the compiled loop."""
-        return _simulated(scene, settings, step, duration, None)
+    def run(self, scene: FixedScene, settings: Settings, step: float, duration: float,
+            law: ContactLaw | None = None) -> Trajectory:  # fmt: skip
+        """Simulate with the compiled loop, or with a given law."""
+        contact: dict[str, Any] = {} if law else dict(settings.options)
+        run = simulate(own_scene(scene, step, duration, **contact), law)
+        if not run.complete:
+            raise IapbError(run.stopped)
+        keep = slice(None, None, steps_between_samples(step))
+        touching = np.append(np.diff(run.contacts.offsets), 0)
+        return Trajectory(run.time[keep], *world_state(run.q[keep], run.v[keep]), touching[keep])
 
 
-class RigidWorld:
+class RigidWorld(ImpulseAugmentedEngine):
     """Rigid contacts at velocity level, with one QP per step."""
 
     title = "ideal world (ours)"
-
-    def version(self) -> str:
-        """Our own."""
-        return _own_version()
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return Moreau's step for e > 0 and Stewart and Trinkle's for e = 0, without correction of overlaps."""
         return Settings(step or STEP, {"scheme": "automatic", "margin": 0.02})
 
-    def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
+    def run(self, scene: FixedScene, settings: Settings, step: float, duration: float,
+            law: ContactLaw | None = None) -> Trajectory:  # fmt: skip
         """Simulate with the Python loop."""
-        law = RigidConstraints(scheme=str(settings.options["scheme"]), margin=float(settings.options["margin"]))
-        return _simulated(scene, Settings(step), step, duration, law)
-
-
-def _simulated(scene: FixedScene, settings: Settings, step: float, duration: float,
-               law: ContactLaw | None) -> Trajectory:  # fmt: skip
-    contact: dict[str, Any] = dict(settings.options)
-    run = simulate(own_scene(scene, step, duration, **contact), law)
-    if not run.complete:
-        raise IapbError(run.stopped)
-    keep = slice(None, None, steps_between_samples(step))
-    touching = np.append(np.diff(run.contacts.offsets), 0)
-    return Trajectory(run.time[keep], *world_state(run.q[keep], run.v[keep]), touching[keep])
-
-
-def _own_version() -> str:
-    from importlib.metadata import version
-
-    return version("iapb")
+        options: dict[str, Any] = dict(settings.options)
+        return super().run(scene, settings, step, duration, law or RigidConstraints(**options))
 
 
 def own_scene(scene: FixedScene, step: float, duration: float, **contact: float | str) -> Scene:
     """Return a fixed scene as a `Scene`, with contact settings by the names of a scene file."""
-    document = {
+    document: dict[str, Any] = {
         "name": scene.name, "dimensions": 3, "rate": 1.0 / step, "duration": duration,
-        "gravity": list(scene.gravity), "bodies": [_body(body) for body in scene.bodies],
-        "walls": [{"name": wall.name, "kind": "box", "size": wall.size, "center": wall.center,
-                   "rpy": _roll_pitch_yaw(rotation(wall.orientation))} for wall in scene.obstacles],
-        "contact": {"restitution": scene.restitution, **contact},
+        "contact": {"restitution": scene.restitution, **contact}, "bodies": [], "walls": [],
     }  # fmt: skip
-    if not any(scene.gravity):
-        del document["gravity"]
+    if any(scene.gravity):
+        document["gravity"] = list(scene.gravity)
+    for body in scene.bodies:
+        turn = rotation(body.orientation)
+        local = [*(turn.T @ np.array(body.velocity)), *(turn.T @ np.array(body.spin))]
+        document["bodies"].append({
+            "name": body.name.replace(" ", "_"), "joint": "free_flyer", "mass": body.mass, "inertia": body.inertia,
+            "shapes": [_shape(shape) for shape in body.shapes], "position": [*body.position, *body.orientation],
+            "velocity": local})  # fmt: skip
+    for wall in scene.obstacles:
+        turn = rotation(wall.orientation)  # as roll, pitch, yaw, for less than 90 degrees about y
+        rpy = [np.arctan2(turn[2, 1], turn[2, 2]), np.arcsin(-turn[2, 0]), np.arctan2(turn[1, 0], turn[0, 0])]
+        document["walls"].append({"name": wall.name, **_shape(Cuboid(wall.size, wall.center)), "rpy": rpy})
     return scene_from_text(json.dumps(document))
 
 
-def _body(body: RigidBody) -> dict[str, Any]:
-    turn = rotation(body.orientation)
-    local = np.concatenate([turn.T @ np.array(body.velocity), turn.T @ np.array(body.spin)])
-    return {"name": body.name.replace(" ", "_"), "joint": "free_flyer", "mass": body.mass, "inertia": body.inertia,
-            "shapes": [_shape(shape) for shape in body.shapes], "position": [*body.position, *body.orientation],
-            "velocity": local.tolist()}  # fmt: skip
-
-
 def _shape(shape: Sphere | Cuboid) -> dict[str, Any]:
-    if isinstance(shape, Sphere):
-        return {"kind": "sphere", "radius": shape.radius, "center": shape.center}
-    return {"kind": "box", "size": shape.size, "center": shape.center}
-
-
-def _roll_pitch_yaw(turn: Floats) -> list[float]:
-    """Return angles about the fixed x, y and z axes, for rotations of less than 90 degrees about y."""
-    return [float(np.arctan2(turn[2, 1], turn[2, 2])), float(np.arcsin(-turn[2, 0])),
-            float(np.arctan2(turn[1, 0], turn[0, 0]))]  # fmt: skip
+    size = {"radius": shape.radius} if isinstance(shape, Sphere) else {"size": shape.size}
+    return {"kind": "sphere" if "radius" in size else "box", **size, "center": shape.center}
 
 
 def world_state(q: Floats, v: Floats) -> tuple[Floats, Floats, Floats, Floats]:

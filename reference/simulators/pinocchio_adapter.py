@@ -6,17 +6,14 @@ are passed to `impulseDynamics`, which is bilateral and has one e for all rows.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from iapb.errors import MissingDependencyError
 from iapb.system import System
 from reference.contact_rows import find_rows
 from reference.rigid_body import model_of
 from reference.simulators.own_engines import own_scene, world_state
-from reference.simulators.scene import FixedScene, Floats
-from reference.simulators.simulator import Settings
+from reference.simulators.scene import FixedScene
+from reference.simulators.simulator import Settings, engine
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 STEP = 1e-3  # [s] Pinocchio has no default step
@@ -32,7 +29,7 @@ class Pinocchio:
 
     def version(self) -> str:
         """Return the installed version."""
-        return str(_pinocchio().__version__)
+        return str(engine("pinocchio", "pin").__version__)
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the settings, with the damping of the Delassus matrix that redundant rows need.
@@ -45,38 +42,21 @@ class Pinocchio:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with semi-implicit steps; touching, approaching rows are resolved at once at the start of a step."""
-        pinocchio = _pinocchio()
+        pinocchio, damping = engine("pinocchio", "pin"), float(settings.options["inv_damping"])
         system = System(own_scene(scene, step, duration))
-        start = system.make_state()
-        q, v = start.q.copy(), start.v.copy()
+        q, v = (part.copy() for part in system.start)
         model = model_of(system.mechanism).model
         model.gravity.linear = np.array(scene.gravity)
         memory, nothing = model.createData(), np.zeros(model.nv)
         record, stride = Recorder(), steps_between_samples(step)
         for k in range(round(duration / step)):
             v = v + step * pinocchio.aba(model, memory, q, v, nothing)
-            v, touching = self._struck(system, model, memory, q, v, scene.restitution, settings)
+            found = find_rows(system, q, v, 0.0)
+            rows = found.jacobian[found.gamma < -APPROACHES]
+            if len(rows):
+                v = np.array(pinocchio.impulseDynamics(model, memory, q, v, rows, scene.restitution, damping))
             if k % stride == 0:
-                record.add(k * step, *world_state(q, v), touching)
+                record.add(k * step, *world_state(q, v), len(found.gap))
             q = pinocchio.integrate(model, q, step * v)
-        record.add(duration, *world_state(q, v), touching)
+        record.add(duration, *world_state(q, v), len(found.gap))
         return record.trajectory()
-
-    @staticmethod
-    def _struck(system: System, model: Any, memory: Any, q: Floats, v: Floats, restitution: float,
-                settings: Settings) -> tuple[Floats, int]:  # fmt: skip
-        """Return the velocity after the impact of touching, approaching contacts, and the number of touching points."""
-        found = find_rows(system, q, v, 0.0)
-        rows = found.jacobian[found.gamma < -APPROACHES]
-        if not len(rows):
-            return v, len(found.gap)
-        damping = float(settings.options["inv_damping"])
-        return np.array(_pinocchio().impulseDynamics(model, memory, q, v, rows, restitution, damping)), len(found.gap)
-
-
-def _pinocchio() -> Any:
-    try:
-        import pinocchio
-    except ImportError as error:
-        raise MissingDependencyError("pinocchio", "The Pinocchio adapter", "pip install pin") from error
-    return pinocchio

@@ -10,7 +10,6 @@ scenes the bodies touch at the start and must stay in place.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, pi, sin, sqrt
 from typing import Any
@@ -125,40 +124,6 @@ WEIGHT: Vector = (0.0, 0.0, -9.81)
 FLOOR = Obstacle("floor", (2.0, 2.0, 0.5), (0.0, 0.0, -0.25))
 MASS_RATIO_OF_BALLS = 100.0  # the heavy ball and the light one collide with each other and the wall 31 times
 
-
-def elastic_cradle() -> FixedScene:
-    """Five equal balls, 4 mm apart, so that the collisions are successive."""
-    gap = 0.0041
-    places = [-2.0 * RADIUS - 0.0203, *(k * (2.0 * RADIUS + gap) for k in range(4))]
-    balls = tuple(
-        _ball(f"ball {k + 1}", 1.0, x, 0.0, 1.0 if k == 0 else 0.0) for k, x in enumerate(places)
-    )
-    end = ((0.0, 0.0, 0.0),) * 4 + ((1.0, 0.0, 0.0),)
-    return FixedScene("elastic_cradle", "Elastic cradle", "the last ball leaves with the first one's velocity",
-                      balls, (), 1.0, 0.2, 2.0 * RADIUS, final_velocities=end)  # fmt: skip
-
-
-def bernoulli() -> FixedScene:
-    """A ball strikes two touching balls at once (Bernoulli 1742); energy, momentum and symmetry give the result."""
-    start = -sqrt(3.0) * RADIUS - 0.0203
-    balls = (_ball("striker", 1.0, start, 0.0, 1.0), _ball("upper", 1.0, 0.0, RADIUS, 0.0),
-             _ball("lower", 1.0, 0.0, -RADIUS, 0.0))  # fmt: skip
-    along, across = 0.6, 0.2 * sqrt(3.0)  # 2 sqrt(3)/5 along normals at 30 degrees
-    end = ((-0.2, 0.0, 0.0), (along, across, 0.0), (along, -across, 0.0))
-    return FixedScene("bernoulli", "Bernoulli's three balls", "striker −1/5, the others 2√3/5 at 30°", balls, (),
-                      1.0, 0.1, 2.0 * RADIUS, final_velocities=end)  # fmt: skip
-
-
-def two_balls_and_a_wall() -> FixedScene:
-    """A ball of 100 kg drives one of 1 kg against a wall: 31 collisions (Galperin 2003)."""
-    wall = Obstacle("wall", (0.5, 2.0, 2.0), (0.25, 0.0, 0.0))
-    balls = (_ball("heavy", MASS_RATIO_OF_BALLS, -1.1, 0.0, 1.0), _ball("light", 1.0, -0.55, 0.0, 0.0))
-    heavy, light = after_all_collisions(MASS_RATIO_OF_BALLS)
-    return FixedScene("two_balls_and_a_wall", "Two balls and a wall", "31 elastic collisions, all energy kept", balls,
-                      (wall,), 1.0, 3.0, 2.0 * RADIUS,
-                      final_velocities=((heavy, 0.0, 0.0), (light, 0.0, 0.0)))  # fmt: skip
-
-
 def after_all_collisions(ratio: float) -> tuple[float, float]:
     """Return the final velocities of the heavy ball (1 at the start) and the light one; the wall is at +x."""
     heavy, light = 1.0, 0.0
@@ -171,83 +136,72 @@ def after_all_collisions(ratio: float) -> tuple[float, float]:
     return heavy, light
 
 
-def box_on_four_corners() -> FixedScene:
-    """A box lands flat on its face, with four corners at once."""
-    return _dropped("box_on_four_corners", "Box dropped on four corners", (Cuboid((SIDE,) * 3),))
+def _ball(name: str, mass: float, x: float, y: float, speed: float) -> RigidBody:
+    inertia = 0.4 * mass * RADIUS**2
+    return RigidBody(name, mass, (inertia,) * 3, (Sphere(RADIUS),), (x, y, 0.0), velocity=(speed, 0.0, 0.0))
 
 
-def box_on_sixteen_corners() -> FixedScene:
-    """A box on four square feet lands flat, with sixteen corners at once; thirteen of them are redundant."""
-    foot, at = 0.02, 0.04
-    feet = tuple(Cuboid((foot,) * 3, (x, y, -at)) for x in (-at, at) for y in (-at, at))
-    return _dropped("box_on_sixteen_corners", "Box dropped on sixteen corners", feet)
+def _box(name: str, mass: float, height: float, shapes: tuple[Cuboid, ...] = (Cuboid((SIDE,) * 3),),
+         turn: Quaternion = UPRIGHT, fall: float = 0.0) -> RigidBody:  # fmt: skip
+    inertia = (mass * SIDE**2 / 6.0,) * 3
+    return RigidBody(name, mass, inertia, shapes, (0.0, 0.0, height), turn, (0.0, 0.0, -fall) if fall else ORIGIN)
 
 
-def redundant_wedge() -> FixedScene:
-    """A cube falls edge first into a right-angled groove, with eight corners at once; three are independent."""
-    clear = 0.0103
-    start = (0.0, 0.0, sqrt(2.0) * (0.5 * SIDE + clear))
-    cube = RigidBody("cube", 1.0, _cube_inertia(1.0), (Cuboid((SIDE,) * 3),), start, _about_y(pi / 4),
-                     (0.0, 0.0, -1.0))  # fmt: skip
-    return FixedScene("redundant_wedge", "Redundant wedge", "elastic: it leaves as it came", (cube,),
-                      (_slope("left", -1.0), _slope("right", 1.0)), 1.0, 0.05, SIDE,
-                      final_velocities=((0.0, 0.0, 1.0),))  # fmt: skip
+def _about_y(angle: float) -> Quaternion:
+    return (0.0, sin(0.5 * angle), 0.0, cos(0.5 * angle))
 
 
-def heavy_stack() -> FixedScene:
-    """Four stacked boxes, each with a hundred times the mass of the one below."""
-    boxes = tuple(_box(f"box {k + 1}", mass, (k + 0.5) * SIDE) for k, mass in enumerate((1e-3, 0.1, 10.0, 1000.0)))
-    return FixedScene("heavy_stack", "Stack with mass ratio 10⁶", "it stays", boxes, (FLOOR,), 0.0, 1.0, SIDE, WEIGHT)
+def _slope(name: str, side: float) -> Obstacle:
+    """Return half of a groove: a box whose upper face rises from the origin to the `side` at 45 degrees."""
+    width, depth, root = 1.0, 0.2, sqrt(0.5)
+    x, z = (0.5 * width * a - 0.5 * depth * n for a, n in ((side * root, -side * root), (root, root)))
+    return Obstacle(name, (width, 1.0, depth), (x, 0.0, z), _about_y(-side * pi / 4))
 
 
-def resting_box() -> FixedScene:
-    """A box that rests on the floor for a minute."""
-    return FixedScene("resting_box", "Resting box", "it stays", (_box("box", 1.0, 0.5 * SIDE),), (FLOOR,), 0.0, 60.0,
-                      SIDE, WEIGHT)  # fmt: skip
+_CLEAR = 0.0103  # distance of falling boxes from what they strike [m]
+_FEET = tuple(Cuboid((0.02,) * 3, (x, y, -0.04)) for x in (-0.04, 0.04) for y in (-0.04, 0.04))
+_HEAVY, _LIGHT = after_all_collisions(MASS_RATIO_OF_BALLS)
+_ACROSS = 0.2 * sqrt(3.0)  # 2 sqrt(3)/5 along normals at 30 degrees
+_LANDS = "e = 1/2: it leaves flat at half the speed"
 
-
-FIXED_SCENES: dict[str, Callable[[], FixedScene]] = {
-    make.__name__: make
-    for make in (elastic_cradle, bernoulli, two_balls_and_a_wall, box_on_four_corners, box_on_sixteen_corners,
-                 redundant_wedge, heavy_stack, resting_box)
-}  # fmt: skip
+FIXED_SCENES: dict[str, FixedScene] = {scene.name: scene for scene in (
+    # five equal balls, 4 mm apart, so that the collisions are successive
+    FixedScene("elastic_cradle", "Elastic cradle", "the last ball leaves with the first one's velocity",
+               tuple(_ball(f"ball {k + 1}", 1.0, x, 0.0, 0.0 if k else 1.0) for k, x in
+                     enumerate([-2.0 * RADIUS - 0.0203, *(k * (2.0 * RADIUS + 0.0041) for k in range(4))])),
+               (), 1.0, 0.2, 2.0 * RADIUS, final_velocities=(ORIGIN,) * 4 + ((1.0, 0.0, 0.0),)),
+    # a ball strikes two touching balls at once (Bernoulli 1742); energy, momentum and symmetry give the result
+    FixedScene("bernoulli", "Bernoulli's three balls", "striker −1/5, the others 2√3/5 at 30°",
+               (_ball("striker", 1.0, -sqrt(3.0) * RADIUS - 0.0203, 0.0, 1.0), _ball("upper", 1.0, 0.0, RADIUS, 0.0),
+                _ball("lower", 1.0, 0.0, -RADIUS, 0.0)), (), 1.0, 0.1, 2.0 * RADIUS,
+               final_velocities=((-0.2, 0.0, 0.0), (0.6, _ACROSS, 0.0), (0.6, -_ACROSS, 0.0))),
+    # a ball of 100 kg drives one of 1 kg against a wall: 31 collisions (Galperin 2003)
+    FixedScene("two_balls_and_a_wall", "Two balls and a wall", "31 elastic collisions, all energy kept",
+               (_ball("heavy", MASS_RATIO_OF_BALLS, -1.1, 0.0, 1.0), _ball("light", 1.0, -0.55, 0.0, 0.0)),
+               (Obstacle("wall", (0.5, 2.0, 2.0), (0.25, 0.0, 0.0)),), 1.0, 3.0, 2.0 * RADIUS,
+               final_velocities=((_HEAVY, 0.0, 0.0), (_LIGHT, 0.0, 0.0))),
+    # a box lands flat on its face with four corners, or on four square feet with sixteen; thirteen are redundant
+    FixedScene("box_on_four_corners", "Box dropped on four corners", _LANDS,
+               (_box("box", 1.0, 0.5 * SIDE + _CLEAR, fall=1.0),), (FLOOR,), 0.5, 0.05, SIDE,
+               final_velocities=((0.0, 0.0, 0.5),)),
+    FixedScene("box_on_sixteen_corners", "Box dropped on sixteen corners", _LANDS,
+               (_box("box", 1.0, 0.5 * SIDE + _CLEAR, _FEET, fall=1.0),), (FLOOR,), 0.5, 0.05, SIDE,
+               final_velocities=((0.0, 0.0, 0.5),)),
+    # a cube falls edge first into a right-angled groove, with eight corners at once; three are independent
+    FixedScene("redundant_wedge", "Redundant wedge", "elastic: it leaves as it came",
+               (_box("cube", 1.0, sqrt(2.0) * (0.5 * SIDE + _CLEAR), turn=_about_y(pi / 4), fall=1.0),),
+               (_slope("left", -1.0), _slope("right", 1.0)), 1.0, 0.05, SIDE, final_velocities=((0.0, 0.0, 1.0),)),
+    # four stacked boxes, each with a hundred times the mass of the one below
+    FixedScene("heavy_stack", "Stack with mass ratio 10⁶", "it stays",
+               tuple(_box(f"box {k + 1}", mass, (k + 0.5) * SIDE) for k, mass in enumerate((1e-3, 0.1, 10.0, 1000.0))),
+               (FLOOR,), 0.0, 1.0, SIDE, WEIGHT),
+    FixedScene("resting_box", "Resting box", "it stays", (_box("box", 1.0, 0.5 * SIDE),), (FLOOR,), 0.0, 60.0, SIDE,
+               WEIGHT),
+)}  # fmt: skip
 
 
 def fixed_scene(name: str) -> FixedScene:
     """Return the scene of that name."""
     if name not in FIXED_SCENES:
         raise ArgumentError("scene", name, one_of(name, FIXED_SCENES))
-    return FIXED_SCENES[name]()
-
-
-def _ball(name: str, mass: float, x: float, y: float, speed: float) -> RigidBody:
-    inertia = 0.4 * mass * RADIUS**2
-    return RigidBody(name, mass, (inertia,) * 3, (Sphere(RADIUS),), (x, y, 0.0), velocity=(speed, 0.0, 0.0))
-
-
-def _box(name: str, mass: float, height: float) -> RigidBody:
-    return RigidBody(name, mass, _cube_inertia(mass), (Cuboid((SIDE,) * 3),), (0.0, 0.0, height))
-
-
-def _cube_inertia(mass: float) -> Vector:
-    return (mass * SIDE**2 / 6.0,) * 3
-
-
-def _dropped(name: str, title: str, shapes: tuple[Cuboid, ...]) -> FixedScene:
-    clear, speed, restitution = 0.0103, 1.0, 0.5
-    body = RigidBody("box", 1.0, _cube_inertia(1.0), shapes, (0.0, 0.0, 0.5 * SIDE + clear),
-                     velocity=(0.0, 0.0, -speed))  # fmt: skip
-    return FixedScene(name, title, "e = 1/2: it leaves flat at half the speed", (body,), (FLOOR,), restitution, 0.05,
-                      SIDE, final_velocities=((0.0, 0.0, restitution * speed),))  # fmt: skip
-
-
-def _about_y(angle: float) -> tuple[float, float, float, float]:
-    return (0.0, sin(0.5 * angle), 0.0, cos(0.5 * angle))
-
-
-def _slope(name: str, side: float) -> Obstacle:
-    """Return half of the groove: a box whose upper face rises from the origin to the `side` at 45 degrees."""
-    width, depth, root = 1.0, 0.2, sqrt(0.5)
-    along, normal = (side * root, root), (-side * root, root)
-    center = tuple(0.5 * width * a - 0.5 * depth * n for a, n in zip(along, normal, strict=True))
-    return Obstacle(name, (width, 1.0, depth), (center[0], 0.0, center[1]), _about_y(-side * pi / 4))
+    return FIXED_SCENES[name]

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from math import atan2, exp, log, pi, sqrt
-from typing import Protocol
+from typing import Any, Protocol
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, MissingDependencyError
 from reference.simulators.scene import FixedScene
 from reference.simulators.trajectory import Trajectory
 
@@ -33,12 +34,8 @@ class Settings:
 
     def __str__(self) -> str:
         """Return the settings on one line."""
-        return ", ".join([f"step {1e3 * self.step:g} ms", *(f"{name} {_text(value)}"
-                                                            for name, value in self.options.items())])  # fmt: skip
-
-
-def _text(value: str | float) -> str:
-    return value if isinstance(value, str) else f"{value:.4g}"
+        texts = (f"{name} {x if isinstance(x, str) else f'{x:.4g}'}" for name, x in self.options.items())
+        return ", ".join([f"step {1e3 * self.step:g} ms", *texts])
 
 
 class Simulator(Protocol):
@@ -63,6 +60,15 @@ class Simulator(Protocol):
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate the scene for a duration [s]."""
         ...
+
+
+def engine(module: str, package: str = "") -> Any:
+    """Import an engine; if it is missing, raise a MissingDependencyError, which says how to install it."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = package or module
+        raise MissingDependencyError(package, f"The adapter of {package}", "pip install 'iapb[peers]'") from error
 
 
 def spring_restitution(damping_ratio: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,19 +53,17 @@ class Recorder:
     """Collects the states in an adapter's loop."""
 
     def __init__(self) -> None:
-        self._rows: list[tuple[float, Floats, Floats, Floats, Floats, int]] = []
+        self._rows: list[tuple[Any, ...]] = []
 
     def add(self, time: float, position: Floats, orientation: Floats, velocity: Floats, spin: Floats,
             contacts: int) -> None:  # fmt: skip
         """Keep copies of the arrays (b, 3), (b, 4), (b, 3), (b, 3) of one instant."""
-        row = (time, np.array(position), np.array(orientation), np.array(velocity), np.array(spin), contacts)
-        self._rows.append(row)
+        states = (np.array(part) for part in (position, orientation, velocity, spin))
+        self._rows.append((time, *states, contacts))
 
     def trajectory(self) -> Trajectory:
         """Return the trajectory of all kept instants."""
-        time, position, orientation, velocity, spin, contacts = (np.array(part) for part in
-                                                                 zip(*self._rows, strict=True))  # fmt: skip
-        return Trajectory(time, position, orientation, velocity, spin, contacts)
+        return Trajectory(*(np.array(part) for part in zip(*self._rows, strict=True)))
 
 
 def steps_between_samples(step: float) -> int:
@@ -79,45 +78,33 @@ def deepest_overlap(scene: FixedScene, motion: Trajectory, instants: int = 2000)
     overlap along the normals of their faces (separating axes; edge axes are not needed for faces in contact).
     """
     every = max(1, len(motion.time) // instants)
-    frames = [(motion.position[::every, k], rotation(motion.orientation[::every, k]), body.shapes)
+    frames = [(body.shapes, motion.position[::every, k], rotation(motion.orientation[::every, k]))
               for k, body in enumerate(scene.bodies)]  # fmt: skip
     count = len(motion.time[::every])
-    for wall in scene.obstacles:
-        turn = np.broadcast_to(rotation(wall.orientation), (count, 3, 3))
-        frames.append((np.broadcast_to(np.array(wall.center), (count, 3)), turn, (Cuboid(wall.size),)))
-    depth = 0.0
-    for first in range(len(scene.bodies)):
-        for second in range(first + 1, len(frames)):
-            for a in frames[first][2]:
-                for b in frames[second][2]:
-                    depth = max(depth, float(_overlap(a, frames[first], b, frames[second]).max()))
-    return depth
+    frames += [((Cuboid(wall.size),), np.broadcast_to(np.array(wall.center), (count, 3)),
+                np.broadcast_to(rotation(wall.orientation), (count, 3, 3))) for wall in scene.obstacles]  # fmt: skip
+    depths = [float(_overlap(a, x_a, turn_a, b, x_b, turn_b).max())
+              for first, (shapes_a, x_a, turn_a) in enumerate(frames[: len(scene.bodies)])
+              for shapes_b, x_b, turn_b in frames[first + 1 :] for a in shapes_a for b in shapes_b]  # fmt: skip
+    return max([0.0, *depths])
 
 
-def _overlap(a: Sphere | Cuboid, frame_a: tuple, b: Sphere | Cuboid, frame_b: tuple) -> Floats:
+def _overlap(a: Sphere | Cuboid, x_a: Floats, turn_a: Floats, b: Sphere | Cuboid, x_b: Floats,
+             turn_b: Floats) -> Floats:  # fmt: skip
     """Return the overlap (n,) of two shapes; it is negative or zero if they are apart."""
-    apart = (frame_b[0] + frame_b[1] @ np.array(b.center)) - (frame_a[0] + frame_a[1] @ np.array(a.center))
+    apart = (x_b + turn_b @ np.array(b.center)) - (x_a + turn_a @ np.array(a.center))
     if isinstance(a, Sphere) and isinstance(b, Sphere):
         return np.asarray(a.radius + b.radius - np.linalg.norm(apart, axis=1))
-    if isinstance(a, Sphere):
-        return _sphere_in_box(a, b, -apart, frame_b[1])
     if isinstance(b, Sphere):
-        return _sphere_in_box(b, a, apart, frame_a[1])
-    half_a, half_b = 0.5 * np.array(a.size), 0.5 * np.array(b.size)
-    depths = []
-    for axes in (frame_a[1], frame_b[1]):
-        for k in range(3):
-            axis = axes[:, :, k]
-            reach = sum(np.abs(np.einsum("ni,nij->nj", axis, turn)) @ half
-                        for turn, half in ((frame_a[1], half_a), (frame_b[1], half_b)))  # fmt: skip
-            depths.append(reach - np.abs(np.einsum("ni,ni->n", axis, apart)))
+        a, turn_b, apart, b = b, turn_a, -apart, a
+    half_b = 0.5 * np.array(b.size)  # type: ignore[union-attr]
+    if isinstance(a, Sphere):  # exact while the ball's centre is outside
+        reach = np.abs(np.einsum("nji,nj->ni", turn_b, -apart)) - half_b
+        outside = np.linalg.norm(np.maximum(reach, 0.0), axis=1)
+        return np.asarray(np.where(outside > 0.0, a.radius - outside, a.radius + np.min(-reach, axis=1)))
+    depths, half_a = [], 0.5 * np.array(a.size)
+    for axis in (axes[:, :, k] for axes in (turn_a, turn_b) for k in range(3)):
+        reach = sum(np.abs(np.einsum("ni,nij->nj", axis, turn)) @ half
+                    for turn, half in ((turn_a, half_a), (turn_b, half_b)))  # fmt: skip
+        depths.append(reach - np.abs(np.einsum("ni,ni->n", axis, apart)))
     return np.asarray(np.min(depths, axis=0))
-
-
-def _sphere_in_box(ball: Sphere, box: Cuboid | Sphere, offset: Floats, turn: Floats) -> Floats:
-    """Return the overlap (n,) of a ball at `offset` from a box's centre; exact while the ball's centre is outside."""
-    half = 0.5 * np.array(box.size if isinstance(box, Cuboid) else (0.0,) * 3)
-    local = np.einsum("nji,nj->ni", turn, offset)
-    outside = np.linalg.norm(np.maximum(np.abs(local) - half, 0.0), axis=1)
-    inside = np.min(half - np.abs(local), axis=1)
-    return np.asarray(np.where(outside > 0.0, ball.radius - outside, ball.radius + inside))

@@ -1,4 +1,4 @@
-"""The table of solvers. Each solver has its own module; its package is imported at the solver's first call.
+"""The table of solvers. Each line names the module of a solver; its package is imported at the solver's first call.
 
 A solver module has a function ``solve(problem) -> Answer``, which may raise SolverError to refuse a problem.
 To add a solver, write its module and add a line to SOLVERS.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import importlib
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from types import ModuleType
@@ -34,46 +35,39 @@ class SolverEntry:
     takes: str
     bilateral: bool = False  # accepts two-sided rows as well
     option: str = ""  # argument of the module's solve if it serves several solvers
-    of_the_machine: bool = False  # not a package of this environment: the module starts it, or says that it is missing
 
 
-_CVXPY = "reference.complementarity.solvers.cvxpy_qp"
-_PINOCCHIO = "reference.complementarity.solvers.pinocchio_contact"
-_SICONOS = "reference.complementarity.solvers.siconos"
 _HERE = "reference.complementarity.solvers"
+_PINOCCHIO, _SICONOS = f"{_HERE}.pinocchio_contact", f"{_HERE}.siconos"
 
 SOLVERS: dict[str, SolverEntry] = {
     "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp", True),
     "lemke": SolverEntry(f"{_HERE}.lemke", "quantecon", "complementary pivoting (Lemke)", "lcp"),
-    "gauss_seidel": SolverEntry(f"{_HERE}.gauss_seidel", "numba", "projected Gauss-Seidel", "lcp", True),
-    "daqp": SolverEntry(f"{_HERE}.daqp_qp", "daqp", "dual active set", "convex", True),
-    "quadprog": SolverEntry(
-        f"{_HERE}.quadprog_qp", "qpsolvers quadprog", "Goldfarb-Idnani active set", "convex"
-    ),
-    "proxqp": SolverEntry(
-        f"{_HERE}.proxqp_qp", "qpsolvers proxsuite", "proximal augmented Lagrangian", "convex", True
-    ),
-    "cvxpy_clarabel": SolverEntry(_CVXPY, "cvxpy clarabel", "interior point", "convex", True, "CLARABEL"),
-    "cvxpy_osqp": SolverEntry(_CVXPY, "cvxpy osqp", "ADMM", "convex", True, "OSQP"),
-    "cvxpy_scs": SolverEntry(_CVXPY, "cvxpy scs", "ADMM on the conic form", "convex", True, "SCS"),
-    "nsgs": SolverEntry(f"{_HERE}.block_gauss_seidel", "numba", "block Gauss-Seidel on the cones", "cone", True),
+    "gauss_seidel": SolverEntry(f"{_HERE}.sweeps", "numba", "projected Gauss-Seidel", "lcp", True),
+    "daqp": SolverEntry(f"{_HERE}.qp", "daqp", "dual active set", "convex", True, "daqp"),
+    "quadprog": SolverEntry(f"{_HERE}.qp", "qpsolvers quadprog", "Goldfarb-Idnani active set", "convex", False,
+                            "quadprog"),
+    "proxqp": SolverEntry(f"{_HERE}.qp", "qpsolvers proxsuite", "proximal augmented Lagrangian", "convex", True,
+                          "proxqp"),
+    "cvxpy_clarabel": SolverEntry(f"{_HERE}.qp", "cvxpy clarabel", "interior point", "convex", True, "CLARABEL"),
+    "cvxpy_osqp": SolverEntry(f"{_HERE}.qp", "cvxpy osqp", "ADMM", "convex", True, "OSQP"),
+    "cvxpy_scs": SolverEntry(f"{_HERE}.qp", "cvxpy scs", "ADMM on the conic form", "convex", True, "SCS"),
+    "nsgs": SolverEntry(f"{_HERE}.sweeps", "numba", "block Gauss-Seidel on the cones", "cone", True),
     "newton_cones": SolverEntry(f"{_HERE}.newton_cones", "scipy", "ADMM, then semismooth Newton", "cone", True),
     "cvxpy_socp": SolverEntry(f"{_HERE}.cvxpy_socp", "cvxpy clarabel", "interior point, fixed point", "cone", True),
     "pinocchio_pgs": SolverEntry(_PINOCCHIO, "pinocchio", "projected Gauss-Seidel", "cone", option="PGS"),
     "pinocchio_admm": SolverEntry(_PINOCCHIO, "pinocchio", "ADMM", "cone", option="ADMM"),
-    "siconos_lemke": SolverEntry(_SICONOS, "siconos", "complementary pivoting (Lemke)", "lcp", False, "LEMKE", True),
-    "siconos_nsgs": SolverEntry(_SICONOS, "siconos", "nonsmooth Gauss-Seidel", "cone", False, "NSGS", True),
-    "siconos_newton": SolverEntry(_SICONOS, "siconos", "Alart-Curnier Newton", "cone", False, "NSN_AC", True),
-}
+    "siconos_lemke": SolverEntry(_SICONOS, "siconos", "complementary pivoting (Lemke)", "lcp", option="LEMKE"),
+    "siconos_nsgs": SolverEntry(_SICONOS, "siconos", "nonsmooth Gauss-Seidel", "cone", option="NSGS"),
+    "siconos_newton": SolverEntry(_SICONOS, "siconos", "Alart-Curnier Newton", "cone", option="NSN_AC"),
+}  # fmt: skip
 _INSTALL_NAMES = {"pinocchio": "pin"}  # packages whose install name differs from their import name
 
 
 def solver_names(problem: ImpactProblem | None = None) -> tuple[str, ...]:
     """Return the solvers' names; with a problem, only those that take its kind (friction or not)."""
-    if problem is None:
-        return tuple(SOLVERS)
-    frictional = problem.friction is not None
-    return tuple(name for name, entry in SOLVERS.items() if (entry.takes == "cone") == frictional)
+    cone = problem is not None and problem.friction is not None
+    return tuple(name for name, entry in SOLVERS.items() if problem is None or (entry.takes == "cone") == cone)
 
 
 def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
@@ -97,12 +91,7 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
         answer = _known_without_solver(problem, entry) or call(problem, *filter(None, [entry.option]))
     except SolverError as error:
         answer = Answer(None, str(error), refused=str(error).startswith("refused"))
-    except (
-        ArithmeticError,
-        LookupError,
-        RuntimeError,
-        ValueError,
-    ) as error:  # raised inside a foreign package
+    except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:  # raised inside a foreign package
         answer = Answer(None, f"{type(error).__name__}: {error}")
     seconds = time.perf_counter() - started
     impulse = None if answer.impulse is None else np.asarray(answer.impulse, dtype=np.float64)
@@ -117,27 +106,27 @@ def import_alone(name: str) -> ModuleType:
     """
     package = name.partition(".")[0]
     found = find_spec(package)
-    if found is None:
-        raise ModuleNotFoundError(f"No module named {package!r}", name=package)
-    if found.origin is None:
+    if found is None or found.origin is None:
         return importlib.import_module(name)
     with open(found.origin) as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         return importlib.import_module(name)
 
 
-def _load(solver: str, entry: SolverEntry):  # type: ignore[no-untyped-def]
-    if entry.of_the_machine:
-        module = importlib.import_module(entry.module)
-        module.start()
-        return module.solve
+def _load(solver: str, entry: SolverEntry) -> Callable[..., Answer]:
+    """Import now what the solver needs, so that this does not count as its time."""
     try:
-        for package in entry.package.split():  # here, so that imports do not count as the solver's time
-            import_alone(package)
-        return importlib.import_module(entry.module).solve
+        for package in entry.package.split():
+            if package != "siconos":  # of the machine's Python: `start` runs it, or says that it is missing
+                import_alone(package)
+        module = importlib.import_module(entry.module)
     except ImportError as error:
         install = "pip install " + " ".join(_INSTALL_NAMES.get(x, x) for x in entry.package.split())
         raise MissingDependencyError(entry.package, f"solver {solver!r}", install) from error
+    if hasattr(module, "start"):
+        module.start()
+    found: Callable[..., Answer] = module.solve
+    return found
 
 
 def _known_without_solver(problem: ImpactProblem, entry: SolverEntry) -> Answer | None:

@@ -60,25 +60,21 @@ def solve(problem: ImpactProblem) -> Answer:
 
 
 def _candidate(w: Floats, b: Floats, two_sided: NDArray[np.bool_], active: list[int]) -> Floats | None:
-    p = np.zeros(len(b))
-    if active:
-        block = w[np.ix_(active, active)]
-        regular = np.linalg.cond(block) * _SINGULAR < 1.0
-        found = np.linalg.solve(block, -b[active]) if regular else _feasible_point(w, b, two_sided, active)
-        if found is None:
-            return None
-        p[active] = found
-    return p
-
-
-def _feasible_point(w: Floats, b: Floats, two_sided: NDArray[np.bool_], active: list[int]) -> Floats | None:
-    """Decide by a linear program whether the singular piece holds a solution; return the one of least sum."""
+    """Return the solution of one active set; if W_aa is singular, by a linear program the one of least sum."""
     from scipy.optimize import linprog
 
-    passive = [i for i in range(len(b)) if i not in active]
-    columns = w[:, active]
-    bounds = [(None if two_sided[i] else 0.0, None) for i in active]
-    cost = np.where(two_sided[active], 0.0, 1.0)
-    accuracy = {"primal_feasibility_tolerance": _FEASIBLE, "dual_feasibility_tolerance": _FEASIBLE}
-    found = linprog(cost, -columns[passive], b[passive], columns[active], -b[active], bounds, "highs", options=accuracy)
-    return None if found.x is None else np.asarray(found.x, np.float64)
+    p = np.zeros(len(b))
+    if active:
+        columns = w[:, active]
+        if np.linalg.cond(columns[active]) * _SINGULAR < 1.0:
+            p[active] = np.linalg.solve(columns[active], -b[active])
+            return p
+        passive = [i for i in range(len(b)) if i not in active]
+        bounds = [(None if two_sided[i] else 0.0, None) for i in active]
+        accuracy = {"primal_feasibility_tolerance": _FEASIBLE, "dual_feasibility_tolerance": _FEASIBLE}
+        found = linprog(np.where(two_sided[active], 0.0, 1.0), -columns[passive], b[passive], columns[active],
+                        -b[active], bounds, "highs", options=accuracy)  # fmt: skip
+        if found.x is None:
+            return None
+        p[active] = found.x
+    return p

@@ -34,37 +34,6 @@ def solve(problem: ImpactProblem) -> Answer:
     """Return the impulse; its residuals show whether it converged."""
     if problem.asymmetry > SYMMETRY_TOLERANCE:
         raise SolverError(f"refused: W is asymmetric (relative {problem.asymmetry:.1e})")
-    unit = _in_units(problem)
-    p, said = _admm(unit)
-    return Answer(p.ravel() * unit.length, said)
-
-
-class _Unit(NamedTuple):
-    """The problem scaled to unit blocks of W and unit b, with p = length * (unit p)."""
-
-    W: Floats
-    b: Floats
-    mu: Floats
-    joints: NDArray[np.bool_]
-    relaxed: bool
-    length: Floats
-
-    def velocity(self, p: Floats) -> Floats:
-        """Return W p + b with Coulomb's shift (k, m)."""
-        w = (self.W @ p.ravel() + self.b).reshape(p.shape)
-        return w if self.relaxed else de_saxce_shift(w, self.mu)
-
-    def project(self, p: Floats) -> Floats:
-        """Project p on the cones; a joint's p is unchanged."""
-        return np.where(self.joints[:, None], p, project_on_cone(p, self.mu))
-
-    def natural_map(self, p: Floats) -> Floats:
-        """Return F (k, m)."""
-        w = self.velocity(p)
-        return np.where(self.joints[:, None], w, p - project_on_cone(p - w, self.mu))
-
-
-def _in_units(problem: ImpactProblem) -> _Unit:
     k, m = problem.contacts, problem.contact_size
     blocks = problem.delassus.reshape(k, m, k, m)[np.arange(k), :, np.arange(k)]
     inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2))
@@ -72,7 +41,24 @@ def _in_units(problem: ImpactProblem) -> _Unit:
     speed = float(np.abs(scale * problem.offset).max()) or velocity_scale(problem)
     W = scale[:, None] * problem.delassus * scale
     mu = np.where(problem.two_sided, 0.0, problem.friction_or_zero)
-    return _Unit(0.5 * (W + W.T), scale * problem.offset / speed, mu, problem.two_sided, problem.relaxed, scale * speed)
+    p, said = _admm(_Unit(0.5 * (W + W.T), scale * problem.offset / speed, mu, problem.two_sided, problem.relaxed))
+    return Answer(p.ravel() * (scale * speed), said)
+
+
+class _Unit(NamedTuple):
+    """The problem scaled to unit blocks of W and unit b."""
+
+    W: Floats
+    b: Floats
+    mu: Floats
+    joints: NDArray[np.bool_]
+    relaxed: bool
+
+    def natural_map(self, p: Floats) -> Floats:
+        """Return F (k, m), with Coulomb's shift in W p + b."""
+        w = (self.W @ p.ravel() + self.b).reshape(p.shape)
+        w = w if self.relaxed else de_saxce_shift(w, self.mu)
+        return np.where(self.joints[:, None], w, p - project_on_cone(p - w, self.mu))
 
 
 def _admm(unit: _Unit) -> tuple[Floats, str]:
@@ -91,7 +77,8 @@ def _admm(unit: _Unit) -> tuple[Floats, str]:
         if not unit.relaxed:  # the velocity of x follows from the residual of the right side
             slip = (right - rho * x + unit.b).reshape(shape)[:, 1:]
             shift.reshape(shape)[:, 0] = unit.mu * np.linalg.norm(slip, axis=1)
-        before, z = z, unit.project((x + y / rho).reshape(shape)).ravel()
+        moved = (x + y / rho).reshape(shape)
+        before, z = z, np.where(unit.joints[:, None], moved, project_on_cone(moved, unit.mu)).ravel()
         y += rho * (x - z)
         if done % _BALANCED_EVERY == 0:
             primal, dual = np.abs(x - z).max(), rho * np.abs(z - before).max()

@@ -6,10 +6,7 @@ Source: Carpentier, Montaut, Le Lidec, From compliant to rigid contact simulatio
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference.complementarity.problem import ImpactProblem
@@ -27,13 +24,19 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
         raise SolverError("refused: takes contacts of three components only")
     if method == "PGS" and problem.relaxed:
         raise SolverError("refused: pin 4.1 solves Coulomb's law here, whatever its setting solve_ncp says")
-    turned = _normal_last(problem.contacts)
+    # the order (t, t, n) of every contact
+    turned = (np.array([1, 2, 0]) + 3 * np.arange(problem.contacts)[:, None]).ravel()
     inertia, speed = float(np.abs(problem.delassus).max()) or 1.0, velocity_scale(problem)
     w = np.ascontiguousarray((problem.delassus / inertia)[np.ix_(turned, turned)])
-    models, states = _contacts(pin, problem)
-    solver, settings, result = (
-        getattr(pin, method + name)() for name in ("ConstraintSolver", "SolverSettings", "SolverResult")
-    )
+    model = pin.Model()
+    models, states = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+    for mu in problem.friction_or_zero:  # point contacts of which only the friction is set
+        contact = pin.PointContactConstraintModel(model)
+        contact.setFriction(float(mu))
+        models.append(pin.ConstraintModel(contact))
+        states.append(pin.ConstraintModel(contact).createData())
+    solver, settings, result = (getattr(pin, method + name)() for name in
+                                ("ConstraintSolver", "SolverSettings", "SolverResult"))  # fmt: skip
     settings.max_iterations, settings.solve_ncp = _ITERATIONS, not problem.relaxed
     settings.absolute_feasibility_tol = settings.absolute_complementarity_tol = _ACCURACY
     settings.relative_feasibility_tol = settings.relative_complementarity_tol = _ACCURACY
@@ -41,23 +44,4 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
     done = solver.solve(pin.DelassusOperatorDense(w), offset, models, states, settings, result)
     impulse = np.empty(problem.size)
     impulse[turned] = result.retrieveConstraintImpulses()
-    return Answer(
-        impulse * speed / inertia, f"{method}: converged {done} after {result.iterations} iterations"
-    )
-
-
-def _normal_last(contacts: int) -> NDArray[np.int64]:
-    """Return the indices that reorder (n, t, t) into (t, t, n) for every contact."""
-    return (np.array([1, 2, 0]) + 3 * np.arange(contacts)[:, None]).ravel()
-
-
-def _contacts(pin: Any, problem: ImpactProblem) -> tuple[Any, Any]:
-    """Return one Pinocchio point contact per contact, of which only the friction is set."""
-    model = pin.Model()
-    models, states = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
-    for mu in problem.friction_or_zero:
-        contact = pin.PointContactConstraintModel(model)
-        contact.setFriction(float(mu))
-        models.append(pin.ConstraintModel(contact))
-        states.append(pin.ConstraintModel(contact).createData())
-    return models, states
+    return Answer(impulse * speed / inertia, f"{method}: converged {done} after {result.iterations} iterations")

@@ -1,0 +1,120 @@
+"""Convex quadratic programs of frictionless contacts, W = A Aᵀ, in one of two forms.
+
+Velocity form: min ½|x|² subject to A x + b >= 0. Here x = Aᵀp is the change of velocity in kinetic coordinates, and p
+are the multipliers. The Hessian is the identity for any rank of W, so redundant contacts are no problem.
+Impulse form: min ½|Aᵀp|² + bᵀp subject to p >= 0. If all contacts have the same e, then b = (1 + e) A u, and the
+objective is ½|Aᵀp + (1 + e) u|² up to a constant (Moreau; Anitescu and Potra, Nonlinear Dynamics 14, 1997).
+Source: daqp, Arnström, Bemporad, Axehill, IEEE Transactions on Automatic Control 67 (2022); quadprog, Goldfarb, Idnani,
+Mathematical Programming 27 (1983); proxqp, Bambade and others, Robotics: Science and Systems (2022).
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.errors import SolverError
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import Answer, velocity_scale
+
+Floats = NDArray[np.float64]
+
+_INEQUALITY, _EQUALITY = 0, 5  # daqp's `sense` of a row
+_ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings
+_INFINITE = 1e30  # daqp's value for an absent bound
+_PROXQP = 1e-10  # accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
+# Requested accuracy for a problem scaled to unit W and b; the defaults are 1e-4 to 1e-6. Below 1e-11, Clarabel drifts
+# along the unbounded set of impulses of opposed contacts (p to 6e9, residual up to 4e-6).
+_CVXPY: dict[str, dict[str, Any]] = {
+    "CLARABEL": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
+    "OSQP": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20_000, "polishing": True, "time_limit": 10.0},
+    "SCS": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iters": 20_000},
+}
+
+
+def solve(problem: ImpactProblem, method: str) -> Answer:
+    """Return the impulse by "daqp" or "quadprog" (velocity form), "proxqp", or a backend of cvxpy (impulse form)."""
+    if method in _CVXPY:
+        return _by_cvxpy(problem, method)
+    if method == "proxqp":
+        return _by_proxqp(problem)
+    factor = problem.factor
+    try:
+        if method == "daqp":
+            return Answer(daqp(factor, problem.offset, problem.two_sided), "daqp: optimal")
+        return Answer(quadprog(factor, problem.offset), "quadprog: optimal")
+    except SolverError as error:
+        return Answer(None, str(error))
+
+
+def daqp(rows: Floats, offset: Floats, bilateral: NDArray[np.bool_] | None = None) -> Floats:
+    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,); `bilateral` rows are equalities.
+
+    daqp is called itself, because qpsolvers does not tell an infeasible program from another failure.
+
+    Raises
+    ------
+    SolverError
+        daqp ends without a solution (exit flag below 1; -1 means infeasible).
+    """
+    import daqp
+
+    n, d = rows.shape
+    length = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    unit = np.where(length > 0.0, length, 1.0)  # unit rows, unit velocities: daqp's tolerances are absolute
+    scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
+    upper, lower = np.full(n, _INFINITE), -offset / unit / scale
+    sense = np.full(n, _INEQUALITY, dtype=np.int32)
+    if bilateral is not None:
+        upper[bilateral], sense[bilateral] = lower[bilateral], _EQUALITY
+    _, _, flag, detail = daqp.solve(np.eye(d), np.zeros(d), np.ascontiguousarray(rows / unit[:, None]), upper, lower,
+                                    sense, primal_tol=_ACTIVE_SET, dual_tol=_ACTIVE_SET)  # fmt: skip
+    if flag < 1:
+        raise SolverError(f"daqp: exit flag {flag}" + (", infeasible" if flag == -1 else ""))
+    return -np.asarray(detail["lam"]) * scale / unit
+
+
+def quadprog(rows: Floats, offset: Floats) -> Floats:
+    """Return p (n,) as `daqp` does; quadprog can mistake redundant rows for contradictory ones (SolverError)."""
+    from qpsolvers import Problem, solve_problem
+
+    d, length = rows.shape[1], np.linalg.norm(rows, axis=1)
+    unit = np.where(length > 0.0, length, 1.0)
+    answer = solve_problem(Problem(np.eye(d), np.zeros(d), -rows / unit[:, None], offset / unit), solver="quadprog")
+    if not answer.found or answer.z is None:
+        raise SolverError("quadprog: no solution found")
+    return np.asarray(answer.z) / unit
+
+
+def _by_proxqp(problem: ImpactProblem) -> Answer:
+    from qpsolvers import Problem, solve_problem
+
+    w = problem.factor @ problem.factor.T
+    inertia, speed = float(np.abs(w).max(initial=0.0)) or 1.0, velocity_scale(problem)
+    program = Problem(w / inertia, problem.offset / speed, lb=np.where(problem.two_sided, -np.inf, 0.0))
+    answer = solve_problem(program, solver="proxqp", eps_abs=_PROXQP, eps_rel=0.0)
+    if answer.x is None:
+        return Answer(None, "proxqp found no solution")
+    return Answer(np.asarray(answer.x) * speed / inertia, f"proxqp found: {answer.found}")
+
+
+def _by_cvxpy(problem: ImpactProblem, backend: str) -> Answer:
+    """Use the factor A, not a quadratic form of W, because redundant contacts make W rank deficient."""
+    import cvxpy as cp
+
+    rows = problem.factor
+    root, speed = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0, velocity_scale(problem)
+    p, one_sided = cp.Variable(problem.size), np.flatnonzero(~problem.two_sided)
+    energy = 0.5 * cp.sum_squares((rows.T / root) @ p) + (problem.offset / speed) @ p
+    program = cp.Problem(cp.Minimize(energy), [p[one_sided] >= 0.0] if len(one_sided) else [])
+    try:
+        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
+            warnings.simplefilter("ignore", UserWarning)
+            program.solve(solver=backend, **_CVXPY[backend])
+    except cp.error.SolverError as error:
+        return Answer(None, f"{backend}: {error}")
+    impulse = None if p.value is None else np.asarray(p.value) * speed / root**2
+    return Answer(impulse, f"{backend}: {program.status}")

@@ -1,0 +1,77 @@
+"""Siconos (INRIA) in a process of the system's Python, which solves problems and simulates scenes.
+
+Siconos is a package of the system's Python, not of this environment. One process answers all requests, one line of JSON
+each. If it dies or does not answer in time, the request has failed, and the next one gets a new process.
+Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008); Siconos 4.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import select
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from iapb.errors import MissingDependencyError, SolverError
+
+SYSTEM_PYTHON = "/usr/bin/python3"
+INSTALL = "apt-get install python3-siconos"
+_LONGEST = 120.0  # longest time of an answer [s]; the largest stored problems take a few seconds
+_running: list[subprocess.Popen[bytes]] = []
+
+
+def start() -> subprocess.Popen[bytes]:
+    """Return the process, started unless it runs already, so that its imports do not count as a solver's time.
+
+    Raises
+    ------
+    MissingDependencyError
+        The system's Python has no Siconos.
+    """
+    if _running and _running[0].poll() is None:
+        return _running[0]
+    _running.clear()
+    command = [SYSTEM_PYTHON, "-I", str(Path(__file__).with_name("siconos_worker.py"))]
+    try:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        _line(process, _LONGEST)
+    except (OSError, ValueError) as error:
+        raise MissingDependencyError("siconos", f"Siconos in {SYSTEM_PYTHON}", INSTALL) from error
+    _running.append(process)
+    atexit.register(process.kill)
+    return process
+
+
+def ask(task: dict[str, Any], longest: float | None = _LONGEST) -> dict[str, Any]:
+    """Return the answer to one request of `reference.siconos_worker`, within `longest` [s] unless None.
+
+    Raises
+    ------
+    MissingDependencyError
+        The system's Python has no Siconos.
+    SolverError
+        Siconos raises an error, its process ends, or there is no answer in time.
+    """
+    process = start()
+    try:
+        process.stdin.write(json.dumps(task).encode() + b"\n")  # type: ignore[union-attr]
+        process.stdin.flush()  # type: ignore[union-attr]
+        answer: dict[str, Any] = json.loads(_line(process, longest))
+    except (OSError, ValueError) as error:
+        raise SolverError(f"Siconos ended without an answer: {error}") from error
+    if "error" in answer:
+        raise SolverError(f"Siconos stopped: {answer['error']}")
+    return answer
+
+
+def _line(process: subprocess.Popen[bytes], longest: float | None) -> bytes:
+    """Return the process's next line; end the process and raise ValueError if none arrives in time."""
+    ready, _, _ = select.select([process.stdout], [], [], longest)
+    line = process.stdout.readline() if ready else b""  # type: ignore[union-attr]
+    if not line:
+        process.kill()
+        process.wait()
+        raise ValueError("its process ended" if ready else f"no answer within {longest:g} s")
+    return line
