@@ -3,8 +3,8 @@
 `read_problem(path)` chooses the format by the ending of the file's name:
 
 - .lcp, .lcp.gz (lcpy): n, M (n x n, row by row) and q of the LCP  0 <= z ⟂ M z + q >= 0.
-- .dat (Siconos): size, storage flag 0, four sizes, then M **column by column**, q, and a remark. The order is by columns:
-  only so does `lcp_Pang_isolated_sol` have a solution, and `lcp_CPS_2` equal example 4.4.7 of Cottle, Pang, Stone (1992).
+- .dat (Siconos): size, storage flag 0, four sizes, then M **column by column**, q, and a remark. Only by columns does
+  `lcp_Pang_isolated_sol` have a solution, and `lcp_CPS_2` equal example 4.4.7 of Cottle, Pang, Stone (1992).
 - .txt (OpenSurgSim): a labelled MLCP with constraint types, E, HCHt, friction and stored lambda; bilateral constraints
   of one to three dimensions and frictionless unilateral ones are read.
 - .hdf5, .h5: FCLIB, see `reference.fclib`.
@@ -13,12 +13,13 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, MissingDependencyError
 from reference.complementarity.problem import ImpactProblem
 from reference.fclib import LARGEST_SIZE, DatasetError, StoredProblem, read_fclib
 
@@ -46,14 +47,13 @@ def read_problem(path: Path | str) -> StoredProblem:
         The file has an unknown format, is damaged or truncated, or is too large; the message says where.
     """
     path = Path(path)
-    for ending, reader in _READERS.items():
-        if path.name.lower().endswith(ending):
-            break
-    else:
+    ending = next((ending for ending in _READERS if path.name.lower().endswith(ending)), None)
+    if ending is None:
         raise DatasetError(path, f"unknown kind of file; known are {', '.join(_READERS)}")
+    reader = _READERS[ending]
     try:
         return read_fclib(path) if reader is None else reader(path.name, _text(path))
-    except DatasetError:
+    except (DatasetError, MissingDependencyError):
         raise
     except Exception as error:  # a damaged or foreign file can raise any exception
         raise DatasetError(path, f"cannot be read: {error}") from error
@@ -129,4 +129,6 @@ def _square(size: str, words: list[str]) -> tuple[Floats, Floats]:
     return numbers[: n * n].reshape(n, n), numbers[n * n :]
 
 
-_READERS = {".lcp": _lcp, ".lcp.gz": _lcp, ".dat": _siconos_lcp, ".txt": _mlcp, ".hdf5": None, ".h5": None}
+_READERS: dict[str, Callable[[str, str], StoredProblem] | None] = {
+    ".lcp": _lcp, ".lcp.gz": _lcp, ".dat": _siconos_lcp, ".txt": _mlcp, ".hdf5": None, ".h5": None,
+}

@@ -118,8 +118,8 @@ def event_driven(
             break
         at, moving, now = at + wait * (moving + 0.5 * wait * a), moving + wait * a, now + wait
         speed = max(speed, float(np.abs(moving).max()))
-    time, *states = (np.array([arc[k] for arc in arcs]) for k in range(5))
-    return ExactTrajectory(time, *states, now)
+    time, qs, vs, accelerations, impulses = (np.array(part) for part in zip(*arcs, strict=True))
+    return ExactTrajectory(time, qs, vs, accelerations, impulses, now)
 
 
 def _first_root(gap: float, rate: float, curvature: float) -> float:

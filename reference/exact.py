@@ -85,7 +85,8 @@ def exact_impact(
     """
     mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
     jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
-    e, chosen, impulse = rational_matrix("restitution", [restitution])[0, 0], independent_rows(contact_jacobian), v - v
+    e, chosen = rational_matrix("restitution", np.array([restitution]))[0, 0], independent_rows(contact_jacobian)
+    impulse = v - v
     if chosen:
         rows = type(mass)(len(chosen), mass.ncols(), [jacobian[i, j] for i in chosen for j in range(mass.ncols())])
         impulse = rows.transpose() * (rows * mass.solve(rows.transpose())).solve(rows * v) * -(1 + e)

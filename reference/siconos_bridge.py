@@ -12,7 +12,7 @@ import json
 import select
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 from iapb.errors import MissingDependencyError, SolverError
 
@@ -56,8 +56,9 @@ def ask(task: dict[str, Any], longest: float | None = _LONGEST) -> dict[str, Any
     """
     process = start()
     try:
-        process.stdin.write(json.dumps(task).encode() + b"\n")  # type: ignore[union-attr]
-        process.stdin.flush()  # type: ignore[union-attr]
+        requests = cast(BinaryIO, process.stdin)
+        requests.write(json.dumps(task).encode() + b"\n")
+        requests.flush()
         answer: dict[str, Any] = json.loads(_line(process, longest))
     except (OSError, ValueError) as error:
         raise SolverError(f"Siconos ended without an answer: {error}") from error
@@ -68,8 +69,9 @@ def ask(task: dict[str, Any], longest: float | None = _LONGEST) -> dict[str, Any
 
 def _line(process: subprocess.Popen[bytes], longest: float | None) -> bytes:
     """Return the process's next line; end the process and raise ValueError if none arrives in time."""
-    ready, _, _ = select.select([process.stdout], [], [], longest)
-    line = process.stdout.readline() if ready else b""  # type: ignore[union-attr]
+    answers = cast(BinaryIO, process.stdout)
+    ready, _, _ = select.select([answers], [], [], longest)
+    line = answers.readline() if ready else b""
     if not line:
         process.kill()
         process.wait()

@@ -54,7 +54,8 @@ class Bullet:
                     places = (bullet.getBasePositionAndOrientation(body, physicsClientId=world) for body in bodies)
                     speeds = (bullet.getBaseVelocity(body, physicsClientId=world) for body in bodies)
                     touching = len(bullet.getContactPoints(physicsClientId=world))
-                    record.add(k * step, *zip(*places, strict=True), *zip(*speeds, strict=True), touching)
+                    x, turn, v, spin = (*zip(*places, strict=True), *zip(*speeds, strict=True))
+                    record.add(k * step, x, turn, v, spin, touching)
                 if k < last:
                     bullet.stepSimulation(physicsClientId=world)
         finally:

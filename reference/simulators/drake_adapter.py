@@ -90,8 +90,8 @@ def _build(drake: Any, scene: FixedScene, settings: Settings, step: float) -> tu
     if "sap_near_rigid_threshold" in given:
         plant.set_sap_near_rigid_threshold(float(given["sap_near_rigid_threshold"]))
     plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
-    material, stiffness = drake.ProximityProperties(), given.get("point_contact_stiffness")
-    drake.AddContactMaterial(given.get("hunt_crossley_dissipation"), None if stiffness is None else 2.0 * stiffness,
+    material, stiffness = drake.ProximityProperties(), 2.0 * float(given.get("point_contact_stiffness", 0.0))
+    drake.AddContactMaterial(given.get("hunt_crossley_dissipation"), stiffness or None,
                              drake.CoulombFriction(0.0, 0.0), material)  # fmt: skip
     if "relaxation_time" in given:
         material.AddProperty("material", "relaxation_time", given["relaxation_time"])

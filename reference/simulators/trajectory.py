@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from reference.simulators.scene import Cuboid, FixedScene, Floats, Sphere, rotation
 
@@ -55,7 +55,7 @@ class Recorder:
     def __init__(self) -> None:
         self._rows: list[tuple[Any, ...]] = []
 
-    def add(self, time: float, position: Floats, orientation: Floats, velocity: Floats, spin: Floats,
+    def add(self, time: float, position: ArrayLike, orientation: ArrayLike, velocity: ArrayLike, spin: ArrayLike,
             contacts: int) -> None:  # fmt: skip
         """Keep copies of the arrays (b, 3), (b, 4), (b, 3), (b, 3) of one instant."""
         states = (np.array(part) for part in (position, orientation, velocity, spin))

@@ -126,11 +126,11 @@ def test_a_wrong_restitution_is_named(e: Any) -> None:
 
 def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = lambda rows, offset: np.full(len(offset), 0.123)  # noqa: E731
-    monkeypatch.setattr(stepping.daqp_qp, "multipliers", wrong)
+    monkeypatch.setitem(stepping.STEP_SOLVERS, "daqp", wrong)
     assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # quadprog
-    monkeypatch.setattr(stepping.quadprog_qp, "multipliers", wrong)
+    monkeypatch.setitem(stepping.STEP_SOLVERS, "quadprog", wrong)
     assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # Gauss-Seidel
-    monkeypatch.setattr(stepping.gauss_seidel, "multipliers", wrong)
+    monkeypatch.setitem(stepping.STEP_SOLVERS, "gauss_seidel", wrong)
     with pytest.raises(SolverError, match="residual"):
         step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0)
 

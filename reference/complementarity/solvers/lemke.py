@@ -20,7 +20,7 @@ _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
 
 def import_lcp_lemke() -> Callable[..., Any]:
     """Import quantecon's compiled solver, one process at a time."""
-    return import_alone("quantecon.optimize").lcp_lemke  # type: ignore[no-any-return]
+    return import_alone("quantecon.optimize").lcp_lemke
 
 
 def solve(problem: ImpactProblem) -> Answer:

@@ -17,11 +17,11 @@ from iapb.errors import ArgumentError, SolverError
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.adhesion import ADHESIVE, ARTEFACT, NONE, adhesion, nonnegative_impulse
 from reference.complementarity.laws import LAWS, newton_equality, newton_lcp, per_body_rows, poisson
-from reference.complementarity.solvers import daqp_qp
+from reference.complementarity.solvers import qp
 from reference.datasets import read_problem
 from reference.event_driven import LinearSystem, event_driven
 from reference.exact import bulk_energy_gain, exact_impact
-from reference.rigid_step import nearest_velocity
+from reference.rigid_step import STEP_SOLVERS, nearest_velocity
 
 BOWL = Path(__file__).parents[4] / "shared" / "problems" / "lcp" / "bowl.1.dynamics.lcp.gz"
 BAR = np.diag([1.0, 1.0 / 12.0])  # a bar struck at x = 0.5 and 0.4 (design of the counterexample)
@@ -129,7 +129,8 @@ def cycling(monkeypatch: pytest.MonkeyPatch) -> None:
     def cycle(*_: object) -> np.ndarray:
         raise SolverError("daqp: exit flag -2")
 
-    monkeypatch.setattr(daqp_qp, "multipliers", cycle)
+    monkeypatch.setattr(qp, "daqp", cycle)
+    monkeypatch.setitem(STEP_SOLVERS, "daqp", cycle)
 
 
 def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from iapb.errors import MissingDependencyError
+from reference import siconos_bridge as siconos
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.benchmark import run_solvers
-from reference.complementarity.solvers import siconos
 
 
 def _here() -> bool:
@@ -50,20 +50,14 @@ def test_it_keeps_its_own_time_and_refuses_the_relaxed_law() -> None:
 
 
 @needs_siconos
-def test_a_dead_process_is_a_failed_solve_and_the_next_gets_a_new_one() -> None:
-    worker = siconos._process()
-    worker.ask = _dying(worker)  # type: ignore[method-assign]
-    assert solve(SKEW, "siconos_lemke").verdict() == "failed"
+def test_a_dead_process_is_a_failed_solve_and_the_next_gets_a_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    dead = siconos.start()
+    dead.kill()
+    dead.wait()
+    with monkeypatch.context() as patch:
+        patch.setattr(siconos, "start", lambda: dead)
+        assert solve(SKEW, "siconos_lemke").verdict() == "failed"
     assert solve(SKEW, "siconos_lemke").solved()
-
-
-def _dying(worker):  # type: ignore[no-untyped-def]
-    def ask(*arguments):  # type: ignore[no-untyped-def]
-        worker.process.kill()
-        worker.process.wait()
-        return type(worker).ask(worker, *arguments)
-
-    return ask
 
 
 @pytest.mark.parametrize("python", ["/nowhere/python3", "/bin/false"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import builtins
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -119,14 +119,7 @@ def test_damping_gives_the_restitution_asked_for(restitution):
 
 @pytest.mark.parametrize(("name", "module"), [("mujoco", "mujoco"), ("bullet", "pybullet"), ("drake", "pydrake")])
 def test_missing_engine_says_how_to_install_it(monkeypatch, name, module):
-    real = builtins.__import__
-
-    def absent(asked, *arguments, **options):
-        if asked.split(".")[0] == module:
-            raise ImportError(asked)
-        return real(asked, *arguments, **options)
-
-    monkeypatch.setattr(builtins, "__import__", absent)
+    monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingDependencyError, match=r"iapb\[peers\]"):
         find_simulator(name).version()
 
