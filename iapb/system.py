@@ -176,7 +176,7 @@ class System:
             raise ArgumentError("margin", margin, "a distance in metres, infinity allowed")
         buffer, count = make_contact_buffer(self.capacity), 0
         if len(self.pairs):
-            count = int(detect(self.shapes, self.pairs, *self.mechanism.placements(q), float(margin), buffer))
+            count = int(detect(block(self.shapes), self.pairs, *self.mechanism.placements(q), float(margin), buffer))
         if count < 0:
             raise IapbError(STATUS_TEXT[TOO_MANY_CONTACTS])
         columns: list[Any] = [column[:count] for column in buffer]

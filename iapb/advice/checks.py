@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.advice.solids import joined, solids_of
+from iapb.compiled import block
 from iapb.contact.geometry import (
     BOX,
     ENDLESS,
@@ -123,7 +124,7 @@ class Start:
         room = int(corners[self.pairs].sum()) + 32 if few else contact_capacity(self.shapes, self.pairs)
         margin = math.inf if few else max((size for size in sizes if size < math.inf), default=0.0)
         out = make_contact_buffer(room + len(self.stops))
-        count = max(int(detect(self.shapes, self.pairs, *places, margin, out)), 0) if len(self.pairs) else 0
+        count = max(int(detect(block(self.shapes), self.pairs, *places, margin, out)), 0) if len(self.pairs) else 0
         for k, stop in enumerate(self.stops):
             i, place = count + k, self.q[self.mechanism.arrays.q_start[stop.body]]
             out.gap[i], out.normal[i] = stop.arm * stop.sign * (place - stop.bound), 0.0
