@@ -35,11 +35,9 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.run import ImpactTable, blank, quantities
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import (
-    friction_of_pairs,
     frictions_of,
     joint_damping_of,
     kept,
-    largest_friction,
     mechanism_of,
     pairs_of,
     restitution_by_shape,
@@ -200,7 +198,7 @@ class System:
         state: State = _blank_state(
             (len(mechanism.bodies), len(mechanism.tree_dofs), mechanism.nq, mechanism.nv, _largest_tree(mechanism)),
             self.capacity, rows, 2 if isinstance(self.scene, SpatialScene) else 1, slides_in_impacts(self.scene),
-            largest_friction(self.scene) > 0.0 and contact.friction_law == "coulomb", contact.forces == "implicit",
+            self.scene.largest_friction > 0.0 and contact.friction_law == "coulomb", contact.forces == "implicit",
         ).twin()
         q, v = self.start
         for name, values in (("q", q), ("v", v), *self._mass_at_start.items()):
@@ -251,7 +249,7 @@ class System:
 
     @cached_property
     def _facts(self) -> Facts:
-        frictions = np.unique(friction_of_pairs(self.frictions, self.pairs))
+        frictions = np.unique(self.frictions.by_pair(self.pairs))
         return Facts(self.mechanism, *self.parts.pair_counts, tuple(self.restitutions.tolist()),
                      tuple(frictions.tolist()))
 
@@ -342,7 +340,7 @@ def make_stops(scene: Scene, mechanism: Mechanism, shapes: int) -> Stops:
 
 def slides_in_impacts(scene: Scene) -> bool:
     """Whether impacts of this scene can have friction; per-body rows (13)-(14) have no slip, so they have none."""
-    return largest_friction(scene) > 0.0 and scene.contact.self_collision_rows == "relative"
+    return scene.largest_friction > 0.0 and scene.contact.self_collision_rows == "relative"
 
 
 @lru_cache(maxsize=8)

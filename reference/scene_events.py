@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene
-from iapb.scene.mechanism import one_restitution
+from iapb.scene.mechanism import restitutions_of
 from iapb.system import System, wrenches_of
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
@@ -153,7 +153,11 @@ class _Motion:
         if self.coupled and mechanism.nq != mechanism.nv:
             raise ArgumentError("scene", self.scene.name, "a scene without quaternions, or no coupling")
         self.d, self.nq = mechanism.nv, mechanism.nq
-        self.restitution = one_restitution(self.scene, self.system.pairs)
+        values = restitutions_of(self.scene, self.system.pairs)
+        if len(values) > 1:
+            found = f"one restitution for all contacts; here {values[0]:g} to {values[-1]:g}"
+            raise ArgumentError("scene", self.scene.name, found)
+        self.restitution = float(values[0]) if len(values) else self.scene.contact.restitution
         self.tool = slice(*self.system.tool_dofs)
         self.device = model_of(self.system.device_mechanism()) if self.coupled else None
         settings = self.scene.device

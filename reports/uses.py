@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from iapb.errors import ArgumentError, IapbError
+from iapb.errors import ArgumentError, IapbError, SceneError
 from iapb.scene import Scene, find_scene, load_scene, scene_names
-from iapb.scene.document import DocumentError, read_document
+from iapb.scene.document import Document
 from iapb.scene.model import set_value
 
 COMPLETE, PARTIAL = "complete", "partial"
@@ -75,9 +75,10 @@ def parsed(assignments: list[str] | None) -> dict[str, Any]:
         if not equals or not path:
             raise ArgumentError("--set", text, "path=value, such as contact.friction=0.3")
         try:
-            values[path.strip()] = read_document(value)[0].value
-        except DocumentError as error:
-            raise ArgumentError("--set", text, f"a YAML value after the equals sign: {error.expected}") from None
+            values[path.strip()] = Document(value).value
+        except SceneError as error:
+            said = error.mistakes[0].expected
+            raise ArgumentError("--set", text, f"a YAML value after the equals sign: {said}") from None
     return values
 
 

@@ -21,7 +21,7 @@ from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run, digests
-from iapb.scene.mechanism import largest_friction, mechanism_of, pairs_of, restitutions_of, shapes_of
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.model import Scene, scene_kind
 
 Floats = NDArray[np.float64]
@@ -360,7 +360,7 @@ def _joined(parts: list[Certificate]) -> Certificate:
 def _contacts(run: Run, scene: Scene, mechanism: Mechanism) -> tuple[float, float]:
     """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot decide."""
     table, impacts = run.contacts, run.impacts
-    frictionless = not (run.law_settings.get("friction_in_impacts") and largest_friction(scene) > 0.0)
+    frictionless = not (run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0.0)
     if not frictionless or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
     if run.law not in ENGINE_LAWS and not table.impulse.any():  # another world may not record contact impulses

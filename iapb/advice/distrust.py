@@ -178,7 +178,7 @@ def _spun(seen: _Seen) -> Iterator[str]:
         v, flat = run.v[begin:, dofs], body.joint == "planar"
         turn = _frames(run, b, np.arange(begin, run.steps + 1))[0]
         turning, origin = (v * [0.0, 0.0, 1.0], v * [1.0, 1.0, 0.0]) if flat else (v[:, 3:], v[:, :3])
-        inertia = np.eye(3) if flat else np.array(inertia_matrix(body.inertia))
+        inertia = np.eye(3) if flat else inertia_matrix(body.inertia)
         spin = turn @ (turning @ inertia / np.linalg.norm(inertia, 2))[..., None]  # R I w / |I|
         arm = np.cross(turning, np.array([*body.center_of_mass, 0.0])[:3])
         speed = turn @ arm[..., None] + (rotation_of((0.0, 0.0, body.angle)) if flat else turn) @ origin[..., None]

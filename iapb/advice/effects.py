@@ -32,7 +32,7 @@ from iapb.contact.laws import (
 from iapb.haptics.coupling import Coupling
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene
-from iapb.scene.mechanism import friction_by_pair, mechanism_of, pairs_of, restitutions_of, shapes_of
+from iapb.scene.mechanism import frictions_of, mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.model import Device
 
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
@@ -353,7 +353,7 @@ def decide_effects(
     scene, _ = settled(scene)
     mechanism, shapes = mechanism_of(scene), shapes_of(scene)
     pairs = pairs_of(scene, shapes)
-    values = (np.unique(each).tolist() for each in (restitutions_of(scene, pairs), friction_by_pair(scene, pairs)))
+    values = (np.unique(each).tolist() for each in (restitutions_of(scene, pairs), frictions_of(scene).by_pair(pairs)))
     facts = Facts(mechanism, *count_pairs(mechanism, shapes, pairs), *map(tuple, values))
     return decide_for(scene, facts, law, coupling, rendering)
 

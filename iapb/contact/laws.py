@@ -153,7 +153,7 @@ class ImpulseAugmented(_EngineLaw):
         law = super().within(scene)
         if law.friction_in_impacts is not None:
             return law
-        chosen = not law.pushing and scene.contact.forces != "paper" and scene.names_friction
+        chosen = not law.pushing and scene.contact.forces != "paper" and scene.largest_friction > 0.0
         return replace(law, friction_in_impacts=chosen)
 
     @property

@@ -8,158 +8,103 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from pydantic_core import InitErrorDetails
-
 from iapb.mechanics.joints import KINDS
-from iapb.scene.bodies import WORLD
-from iapb.scene.parts import located
+from iapb.scene.bodies import WORLD, counted
+from iapb.scene.parts import Path
 
 MAX_SHAPES = 4000  # bodies and walls together; the number of candidate pairs grows with its square
+Mistakes = Iterator[tuple[Path, Any, str]]
 
 
-def across_parts(given: Any) -> list[InitErrorDetails]:
-    """Return the mistakes between the parts of a scene given as plain values."""
+def across_parts(given: Any) -> Mistakes:
+    """Yield path, value and expectation of each mistake between the parts of a scene given as plain values."""
     if not isinstance(given, dict):
-        return []
-    bodies, walls = _mappings(given.get("bodies")), _mappings(given.get("walls"))
-    return [
-        *_repeated_names("bodies", bodies),
-        *_repeated_names("walls", walls),
-        *_parents(bodies),
-        *_scattered_trees(bodies),
-        *_nothing_moves(bodies),
-        *_too_many_shapes(bodies, walls),
-        *_friction_pairs(given.get("contact"), bodies, walls),
-        *_tool(given, bodies),
-    ]
-
-
-def _mappings(items: Any) -> list[dict[str, Any]]:
-    """Return the items of a list; an item that is no mapping becomes an empty one, to keep the numbering."""
-    if not isinstance(items, (list, tuple)):
-        return []
-    return [item if isinstance(item, dict) else {} for item in items]
-
-
-def _name(mapping: dict[str, Any], field: str = "name", default: str | None = None) -> str | None:
-    text = mapping.get(field, default)
-    return text if isinstance(text, str) else None
-
-
-def _repeated_names(where: str, items: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
-    seen: set[str] = {WORLD} if where == "bodies" else set()
-    for i, item in enumerate(items):
-        name = _name(item)
-        if name in seen:
-            taken = "the static world" if name == WORLD else "an earlier one"
-            yield located((where, i, "name"), name, f"a name of its own: {taken} has this one")
-        elif name is not None:
-            seen.add(name)
-
-
-def _parents(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
-    names = [_name(body) for body in bodies]
+        return
+    bodies, walls = _mappings(given, "bodies"), _mappings(given, "walls")
+    for where, items, known in (("bodies", bodies, {WORLD: "the static world"}), ("walls", walls, {})):
+        for i, item in enumerate(items):
+            name = _text(item, "name")
+            if name in known:
+                yield (where, i, "name"), name, f"a name of its own: {known[name]} has this one"
+            elif name is not None:
+                known[name] = "an earlier one"
+    names, roots = [_text(body, "name") for body in bodies], _roots(bodies)
     for i, body in enumerate(bodies):
-        parent = _name(body, "parent", WORLD)
-        if parent is None or parent == WORLD or parent in names[:i]:
-            continue
-        advice = "listed before it" if parent in names else "of this scene"
-        yield located(("bodies", i, "parent"), parent, f"world, or the name of a body {advice}")
+        parent = _text(body, "parent", WORLD)
+        if parent not in (None, WORLD) and parent not in names[:i]:
+            order = "listed before it" if parent in names else "of this scene"
+            yield ("bodies", i, "parent"), parent, f"world, or the name of a body {order}"
+        if i and roots[i] not in (None, roots[i - 1]) and roots[i] in roots[:i]:  # M would not be block diagonal
+            yield ("bodies", i), names[i], f"its place among the other bodies of {roots[i]}'s tree"
+    if bodies and all(body.get("joint") == "fixed" for body in bodies):
+        yield ("bodies", 0, "joint"), "fixed", "at least one body of the scene that can move"
+    count = len(walls) + sum(len(_mappings(body, "shapes")) for body in bodies)
+    if count > MAX_SHAPES:
+        yield ("bodies",), f"{count} shapes", f"at most {MAX_SHAPES} shapes, walls included"
+    yield from _friction_pairs(given, {*names, *(_text(wall, "name") for wall in walls)})
+    yield from _tool(given, bodies, names, roots)
 
 
-def _scattered_trees(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
-    """Check that the bodies of one tree are consecutive, so that the mass matrix is block diagonal."""
-    roots = _roots(bodies)
-    for i in range(1, len(roots)):
-        if roots[i] is not None and roots[i] != roots[i - 1] and roots[i] in roots[:i]:
-            yield located(
-                ("bodies", i), _name(bodies[i]), f"its place among the other bodies of {roots[i]}'s tree"
-            )
+def _mappings(given: Any, field: str) -> list[dict[str, Any]]:
+    """Return the items of a list; an item that is no mapping becomes an empty one, to keep the numbering."""
+    items = given.get(field) if isinstance(given, dict) else None
+    return [item if isinstance(item, dict) else {} for item in items] if isinstance(items, list | tuple) else []
+
+
+def _text(given: Any, field: str, default: str | None = None) -> str | None:
+    text = given.get(field, default) if isinstance(given, dict) else None
+    return text if isinstance(text, str) else None
 
 
 def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
     """Return the name of each body's root; None if names or parents are wrong."""
     root: dict[str | None, str | None] = {}
     for body in bodies:
-        name, parent = _name(body), _name(body, "parent", WORLD)
+        name, parent = _text(body, "name"), _text(body, "parent", WORLD)
         root.setdefault(name, name if parent == WORLD else root.get(parent))
-    return [root[_name(body)] for body in bodies]
+    return [root[_text(body, "name")] for body in bodies]
 
 
-def _nothing_moves(bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
-    if bodies and all(_name(body, "joint") == "fixed" for body in bodies):
-        yield located(("bodies", 0, "joint"), "fixed", "at least one body of the scene that can move")
-
-
-def _too_many_shapes(bodies: list[dict[str, Any]], walls: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
-    count = len(walls) + sum(len(_mappings(body.get("shapes"))) for body in bodies)
-    if count > MAX_SHAPES:
-        yield located(("bodies",), f"{count} shapes", f"at most {MAX_SHAPES} shapes, walls included")
-
-
-def _friction_pairs(
-    contact: Any, bodies: list[dict[str, Any]], walls: list[dict[str, Any]]
-) -> Iterator[InitErrorDetails]:
+def _friction_pairs(given: Any, names: set[str | None]) -> Mistakes:
     """Check that friction pairs name things of the scene, and that no pair occurs twice."""
-    names, seen, where = {_name(item) for item in (*bodies, *walls)}, set(), ("contact", "friction_pairs")
-    for i, pair in enumerate(_mappings(contact.get("friction_pairs") if isinstance(contact, dict) else None)):
-        between = pair.get("between")
-        if not isinstance(between, (list, tuple)) or not all(isinstance(name, str) for name in between):
+    seen: set[frozenset[str]] = set()
+    for i, pair in enumerate(_mappings(given.get("contact"), "friction_pairs")):
+        between, where = pair.get("between"), ("contact", "friction_pairs", i, "between")
+        if not isinstance(between, list | tuple) or not all(isinstance(name, str) for name in between):
             continue
         for k, name in enumerate(between):
             if name not in names and None not in names:
-                yield located((*where, i, "between", k), name, "the name of a body or a wall of this scene")
+                yield (*where, k), name, "the name of a body or a wall of this scene"
         if len(between) == 2 and between[0] == between[1]:
-            yield located((*where, i, "between"), list(between), "two different things")
+            yield where, list(between), "two different things"
         if frozenset(between) in seen:
-            yield located((*where, i, "between"), list(between), "two things that no earlier pair names")
+            yield where, list(between), "two things that no earlier pair names"
         seen.add(frozenset(between))
 
 
-def _tool(given: dict[str, Any], bodies: list[dict[str, Any]]) -> Iterator[InitErrorDetails]:
+def _tool(given: Any, bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]) -> Mistakes:
     """Check that the hand's body exists and moves, and that its lists have one entry per coordinate of the tool."""
-    couplings, device = given.get("couplings"), given.get("device")
-    hand = given.get("hand")
+    hand, gains, held = given.get("hand"), given.get("couplings"), _text(given.get("hand"), "body")
+    sections: list[tuple[Path, Any]] = [(("device",), given.get("device"))]
     if hand is None:
-        for field, section in (("device", device), ("couplings", couplings)):
+        for path, section in (*sections, (("couplings",), gains)):
             if isinstance(section, dict) and any(section.values()):
-                yield located((field,), section, "a hand in the scene: without one no device takes part")
+                yield path, section, "a hand in the scene: without one no device takes part"
+    if held is None or None in names or not names:  # an unreadable body may be the hand's body
         return
-    held = _name(hand, "body") if isinstance(hand, dict) else None
-    if held is None:
-        return
-    names = [_name(body) for body in bodies]
-    if None in names or not names:
-        return  # the unreadable body may be the hand's body
     if held not in names:
-        yield located(("hand", "body"), held, "the name of a body of this scene")
+        yield ("hand", "body"), held, "the name of a body of this scene"
         return
-    coordinates = _tree_coordinates(bodies, held)
+    root, joints = roots[names.index(held)], [_text(body, "joint") for body in bodies]
+    if root is None or None in roots or not all(joint in KINDS for joint in joints):
+        return
+    coordinates = sum(KINDS[str(joint)].nv for joint, own in zip(joints, roots, strict=True) if own == root)
     if coordinates == 0:
-        yield located(("hand", "body"), held, "a body that can move")
-    if coordinates is not None:
-        yield from _lengths("device", device, ("force_limit", "position_resolution", "damping"), coordinates)
-        for name, gains in couplings.items() if isinstance(couplings, dict) else ():
-            if name in ("four_channel", "unilateral"):
-                yield from _lengths(f"couplings.{name}", gains, ("stiffness", "damping"), coordinates)
-
-
-def _lengths(where: str, section: Any, fields: tuple[str, ...], count: int) -> Iterator[InitErrorDetails]:
-    for field in fields if isinstance(section, dict) else ():
-        numbers = section.get(field)
-        if isinstance(numbers, (list, tuple)) and len(numbers) != count:
-            yield located(
-                (*where.split("."), field),
-                numbers,
-                f"{count} number{'' if count == 1 else 's'}, one per coordinate of the tool",
-            )
-
-
-def _tree_coordinates(bodies: list[dict[str, Any]], held: str) -> int | None:
-    """Return the number of coordinates of the tree that a body belongs to; None if it cannot be determined."""
-    roots = _roots(bodies)
-    held_root = roots[[_name(body) for body in bodies].index(held)]
-    joints = [_name(body, "joint") for body in bodies]
-    if held_root is None or None in roots or any(joint not in KINDS for joint in joints):
-        return None
-    return sum(KINDS[joint or ""].nv for joint, root in zip(joints, roots, strict=True) if root == held_root)
+        yield ("hand", "body"), held, "a body that can move"
+    if isinstance(gains, dict):
+        sections += [(("couplings", name), gains.get(name)) for name in ("four_channel", "unilateral")]
+    for path, section in sections:
+        for field in ("force_limit", "position_resolution", "stiffness", "damping"):
+            numbers = section.get(field) if isinstance(section, dict) else None
+            if isinstance(numbers, list | tuple) and len(numbers) != coordinates:
+                yield (*path, field), numbers, f"{counted(coordinates)}, one per coordinate of the tool"

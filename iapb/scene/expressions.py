@@ -1,7 +1,7 @@
 """Functions of time in a scene file: arithmetic with t, pi and a few functions, read without running Python code.
 
-Their values have the same bits on every processor: they use decimal arithmetic in place of libm, and multiplication for
-powers.
+Their values have the same bits on every processor, because libm is not used: `iapb.elementary` gives sines, decimal
+arithmetic the exponential, and multiplication powers.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import ast
 import math
 import operator
 from collections.abc import Callable
-from decimal import Decimal, localcontext
+from decimal import Decimal
 from functools import cache
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator
 
@@ -22,40 +22,17 @@ from iapb.scene.parts import Text, expectation
 Function = Callable[[float], float]
 
 MAX_POWER = 16
-_DIGITS = 70  # decimals of an angle: a double has 17 digits and comes as near as 1e-19 to a multiple of pi
-_NEGLIGIBLE = Decimal("1e-50")
 _LARGEST_EXPONENT = 709.0  # its exponential is still a double
+
+
+def _sine_cosine(x: float) -> tuple[float, float]:
+    from iapb.elementary import sine_cosine  # brings numba along
+
+    return sine_cosine(x)
 
 
 def _exp(x: float) -> float:
     return float(Decimal(min(x, _LARGEST_EXPONENT + 1.0)).exp()) if x > -750.0 else 0.0
-
-
-@cache
-def _pi(digits: int) -> Decimal:
-    """Return pi to so many digits by Machin's formula 16 atan 1/5 - 4 atan 1/239, in integers with ten more digits."""
-    total = 0
-    for factor, n in ((16, 5), (-4, 239)):
-        power, k = factor * 10 ** (digits + 10) // n, 1
-        while abs(power) > 1:
-            total += power // k
-            power, k = -power // (n * n), k + 2
-    return Decimal(total).scaleb(-digits - 10)
-
-
-def _sine(x: float, odd: int = 1) -> float:
-    """Return sin x, or cos x with odd = 0, by the series of x modulo 2 pi with enough digits for any double."""
-    turns = max(Decimal(x).adjusted(), 0)  # digits of the whole turns in x
-    with localcontext(prec=_DIGITS + turns):
-        angle = Decimal(x) % (2 * _pi(_DIGITS + turns))
-    with localcontext(prec=_DIGITS):
-        term = total = angle if odd else Decimal(1)
-        n = 1 + odd
-        while abs(term) > _NEGLIGIBLE:
-            term *= -angle * angle / (n * (n + 1))
-            total += term
-            n += 2
-        return float(total)
 
 
 def _power(base: float, exponent: float) -> float:
@@ -66,7 +43,7 @@ def _power(base: float, exponent: float) -> float:
 
 NAMES = {"pi": math.pi}
 FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {  # with the least number of arguments
-    "sin": (_sine, 1), "cos": (lambda x: _sine(x, 0), 1), "exp": (_exp, 1),
+    "sin": (lambda x: _sine_cosine(x)[0], 1), "cos": (lambda x: _sine_cosine(x)[1], 1), "exp": (_exp, 1),
     "sqrt": (math.sqrt, 1), "abs": (abs, 1), "step": (lambda x: 1.0 if x >= 0.0 else 0.0, 1),
     "min": (min, 2), "max": (max, 2),
 }
@@ -131,8 +108,8 @@ def _checked(text: str) -> str:
     return text
 
 
-def _as_text(given: Any) -> Any:
-    return repr(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
-
-
-Expression = Annotated[Text, BeforeValidator(_as_text), AfterValidator(_checked)]
+Expression = Annotated[
+    Text,
+    BeforeValidator(lambda given: repr(given) if type(given) in (int, float) else given),
+    AfterValidator(_checked),
+]

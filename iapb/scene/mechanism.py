@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs
 from iapb.elementary import sine_cosine
-from iapb.errors import ArgumentError
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Joint
@@ -26,6 +25,7 @@ from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
 
 Floats = NDArray[np.float64]
+Pairs = NDArray[np.int32]
 
 _MECHANICAL = ("name", "parent", "joint", "axis", "origin", "angle", "rpy", "center_of_mass", "mass", "inertia")
 _KEPT = 8
@@ -57,81 +57,6 @@ def kept(store: dict[Any, Made], key: Any, make: Callable[[], Made]) -> Made:
     return found
 
 
-def start_of(scene: Scene) -> tuple[Floats, Floats]:
-    """Return the scene's start: configuration q (nq,) and velocity v (nv,)."""
-    q = [x for body in scene.bodies for x in body.position]
-    v = [x for body in scene.bodies for x in body.velocity]
-    return np.array(q, np.float64), np.array(v, np.float64)
-
-
-def shapes_of(scene: Scene) -> Shapes:
-    """Return the scene's shapes: those of the bodies in order, then the walls.
-
-    A shape of a body that cannot move (all joints between it and the world are fixed) is static, like a wall.
-    """
-    frames = _frames(scene)
-    described = [_described(shape, frames[owner]) for owner, shape in _owned_shapes(scene)]
-    if isinstance(scene, SpatialScene):
-        return geometry.make_spatial_shapes(described)
-    return geometry.make_shapes(described)
-
-
-def pairs_of(scene: Scene, shapes: Shapes) -> NDArray[np.int32]:
-    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`); the first shape is of a moving body.
-
-    Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies and neighbours across
-    one joint are never paired, because they touch by construction.
-    """
-    owners = [owner for owner, _ in _owned_shapes(scene)]
-    links = _Links(scene)
-    kept = [pair for pair in candidate_pairs(shapes) if links.may_touch(owners[pair[0]], owners[pair[1]])]
-    return np.array(kept, np.int32).reshape(-1, 2)
-
-
-class _Links:
-    """Connections of bodies: in one rigid part, across one joint, or in one tree."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.self_collisions = scene.contact.self_collisions
-        self.root: list[int] = []  # body -> first body of its tree
-        self.part: list[int] = []  # body -> first body of its rigid part
-        self.carrier: dict[int, int] = {}  # rigid part -> rigid part that carries its joint, -1 = the world
-        for i, (body, parent) in enumerate(zip(scene.bodies, _parents(scene), strict=True)):
-            welded = body.joint == "fixed" and parent >= 0
-            self.root.append(i if parent < 0 else self.root[parent])
-            self.part.append(self.part[parent] if welded else i)
-            if not welded:
-                self.carrier[i] = -1 if parent < 0 else self.part[parent]
-
-    def may_touch(self, a: int, b: int) -> bool:
-        """Return whether two bodies can touch (indices; -1 = a wall)."""
-        if a < 0 or b < 0 or self.root[a] != self.root[b]:
-            return True
-        part_a, part_b = self.part[a], self.part[b]
-        adjoining = part_a == part_b or self.carrier[part_a] == part_b or self.carrier[part_b] == part_a
-        return self.self_collisions and not adjoining
-
-
-def _parents(scene: Scene) -> list[int]:
-    """Return the index of each body's parent, -1 for the world."""
-    index = {body.name: i for i, body in enumerate(scene.bodies)} | {WORLD: -1}
-    return [index[body.parent] for body in scene.bodies]
-
-
-def _owned_shapes(scene: Scene) -> list[tuple[int, Any]]:
-    """Return every shape with the index of its body, -1 for walls."""
-    of_bodies = [(i, shape) for i, body in enumerate(scene.bodies) for shape in body.shapes]
-    return of_bodies + [(-1, wall) for wall in scene.walls]
-
-
-def _turn(placed: Any) -> Floats:
-    """Return the rotation matrix of a placement: (3, 3) in space, (2, 2) in the plane."""
-    if hasattr(placed, "rpy"):
-        return rotation_of(placed.rpy)
-    sin, cos = sine_cosine(float(placed.angle))
-    return np.array([[cos, -sin], [sin, cos]])
-
-
 def _body_in_space(body: Any) -> Body:
     flat = len(body.origin) == 2
     rotation, lift = np.eye(3), (0.0,) if flat else ()
@@ -144,53 +69,105 @@ def _body_in_space(body: Any) -> Body:
         placement=(rotation, np.array([*body.origin, *lift])),
         mass=body.mass,
         center_of_mass=np.array([*body.center_of_mass, *lift]),
-        inertia=np.diag([0.5, 0.5, 1.0]) * body.inertia if flat else np.array(inertia_matrix(body.inertia)),
+        inertia=np.diag([0.5, 0.5, 1.0]) * body.inertia if flat else inertia_matrix(body.inertia),
     )
 
 
-class _Frame(NamedTuple):
-    """Frame of a shape's coordinates: its body (-1 = static), and the rotation and shift into the body's frame."""
+def _turn(placed: Any) -> Floats:
+    """Return the rotation matrix of a placement: (3, 3) in space, (2, 2) in the plane."""
+    if hasattr(placed, "rpy"):
+        return rotation_of(placed.rpy)
+    sin, cos = sine_cosine(float(placed.angle))
+    return np.array([[cos, -sin], [sin, cos]])
 
-    body: int
-    rotation: Floats
-    shift: Floats
+
+def start_of(scene: Scene) -> tuple[Floats, Floats]:
+    """Return the scene's start: configuration q (nq,) and velocity v (nv,)."""
+    q = [x for body in scene.bodies for x in body.position]
+    v = [x for body in scene.bodies for x in body.velocity]
+    return np.array(q, np.float64), np.array(v, np.float64)
 
 
-def _frames(scene: Scene) -> list[_Frame]:
-    """Return the frame of each body's shapes, and last that of the walls; static bodies get world axes."""
-    n = 3 if isinstance(scene, SpatialScene) else 2
-    parents = _parents(scene)
-    frames = []
-    for owner in range(len(scene.bodies)):
-        rotation, shift, link = np.eye(n), np.zeros(n), owner
+def joint_damping_of(scene: Scene) -> Floats:
+    """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
+    given = [body.joint_damping or (0.0,) * KINDS[body.joint].nv for body in scene.bodies]
+    return np.array([x for each in given for x in each], np.float64)
+
+
+def _parents(scene: Scene) -> list[int]:
+    """Return the index of each body's parent, -1 for the world."""
+    index = {body.name: i for i, body in enumerate(scene.bodies)} | {WORLD: -1}
+    return [index[body.parent] for body in scene.bodies]
+
+
+def _owned_shapes(scene: Scene) -> list[tuple[int, Any, Any]]:
+    """Return every shape after its body or wall and the body's index, -1 for walls."""
+    of_bodies = [(i, body, shape) for i, body in enumerate(scene.bodies) for shape in body.shapes]
+    return of_bodies + [(-1, wall, wall) for wall in scene.walls]
+
+
+def shapes_of(scene: Scene) -> Shapes:
+    """Return the scene's shapes: those of the bodies in order, then the walls.
+
+    A shape of a body that cannot move (all joints between it and the world are fixed) is static, like a wall.
+    """
+    n, make = (3, geometry.make_spatial_shapes) if isinstance(scene, SpatialScene) else (2, geometry.make_shapes)
+    parents, described = _parents(scene), []
+    for body, _, shape in _owned_shapes(scene):
+        rotation, shift, link = np.eye(n), np.zeros(n), body
         while link >= 0 and scene.bodies[link].joint == "fixed":
             turn = _turn(scene.bodies[link])
             rotation, shift = product(turn, rotation), product(turn, shift) + scene.bodies[link].origin
             link = parents[link]
-        frames.append(_Frame(-1, rotation, shift) if link < 0 else _Frame(owner, np.eye(n), np.zeros(n)))
-    return [*frames, _Frame(-1, np.eye(n), np.zeros(n))]
+        described.append(_described(shape, -1, rotation, shift) if link < 0 else
+                         _described(shape, body, np.eye(n), np.zeros(n)))
+    return make(described)
 
 
-def _described(shape: Any, frame: _Frame) -> Any:
-    """Return a shape of the scene as the narrow phase's class of shape."""
+def _described(shape: Any, body: int, rotation: Floats, shift: Floats) -> Any:
+    """Return a shape of the scene as the narrow phase's class of shape, turned and shifted into the body's frame."""
     if shape.kind == "half_plane":
         return geometry.HalfPlane(shape.point, shape.normal)
     if shape.kind == "half_space":
         return geometry.HalfSpace(shape.point, shape.normal)
-    center = product(frame.rotation, shape.center) + frame.shift
+    center = product(rotation, shape.center) + shift
     if shape.kind == "circle":
-        return geometry.Circle(shape.radius, center, frame.body)
+        return geometry.Circle(shape.radius, center, body)
     if shape.kind == "sphere":
-        return geometry.Sphere(shape.radius, center, frame.body)
-    turn = product(frame.rotation, _turn(shape))
+        return geometry.Sphere(shape.radius, center, body)
+    turn = product(rotation, _turn(shape))
     if len(turn) == 3:
-        return geometry.SpatialBox(shape.size, center, turn, frame.body)
-    corners = _box_corners(*shape.size) if shape.kind == "box" else np.array(shape.vertices)
-    return geometry.Polygon(product(corners, turn.T) + center, frame.body)
+        return geometry.SpatialBox(shape.size, center, turn, body)
+    corners = shape.vertices if shape.kind == "polygon" else 0.5 * np.array(
+        [[-1, -1], [1, -1], [1, 1], [-1, 1]]) * shape.size
+    return geometry.Polygon(product(corners, turn.T) + center, body)
 
 
-def _box_corners(width: float, height: float) -> Floats:
-    return 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
+def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:
+    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`); the first shape is of a moving body.
+
+    Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies and neighbours across
+    one joint are never paired, because they touch by construction.
+    """
+    root: list[int] = []  # body -> first body of its tree
+    part: list[int] = []  # body -> first body of its rigid part
+    carrier: dict[int, int] = {}  # rigid part -> rigid part that carries its joint, -1 = the world
+    for i, (body, parent) in enumerate(zip(scene.bodies, _parents(scene), strict=True)):
+        welded = body.joint == "fixed" and parent >= 0
+        root.append(i if parent < 0 else root[parent])
+        part.append(part[parent] if welded else i)
+        if not welded:
+            carrier[i] = -1 if parent < 0 else part[parent]
+
+    def may_touch(a: int, b: int) -> bool:
+        if a < 0 or b < 0 or root[a] != root[b]:
+            return True
+        adjoining = part[a] == part[b] or carrier[part[a]] == part[b] or carrier[part[b]] == part[a]
+        return scene.contact.self_collisions and not adjoining
+
+    bodies = [body for body, _, _ in _owned_shapes(scene)]
+    found = [(a, b) for a, b in candidate_pairs(shapes) if may_touch(bodies[a], bodies[b])]
+    return np.array(found, np.int32).reshape(-1, 2)
 
 
 class Stop(NamedTuple):
@@ -222,7 +199,8 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> tuple[Stop, ...]:
     found = []
     for i, body in enumerate(scene.bodies):
         if body.joint_limits is not None:
-            arm = _stopping_arm(float(inertia[first[i]]), carried[i]) if body.joint == "revolute" else 1.0
+            turned = float(inertia[first[i]]) if body.joint == "revolute" else 0.0
+            arm = math.sqrt(turned / carried[i]) if turned > 0.0 and carried[i] > 0.0 else 1.0
             found += [Stop(i, parents[i], sign, bound, arm)
                       for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True)]
     return tuple(found)
@@ -232,35 +210,27 @@ def _stop_count(scene: Scene) -> int:
     return 2 * sum(body.joint_limits is not None for body in scene.bodies)
 
 
-def _stopping_arm(inertia: float, mass: float) -> float:
-    """Return the radius of gyration [m]; 1 without mass or inertia."""
-    return math.sqrt(inertia / mass) if inertia > 0.0 and mass > 0.0 else 1.0
-
-
 def restitution_by_shape(scene: Scene) -> Floats:
     """Return the restitution (n,) that the body or wall of each shape gives; UNSTATED if it gives none.
 
     The shapes have the order of `shapes_of`. The stops of the joints follow; they give no restitution.
     """
-    given = [body.restitution for body in scene.bodies for _ in body.shapes]
-    given += [wall.restitution for wall in scene.walls]
-    given += [None] * _stop_count(scene)
+    given = [owner.restitution for _, owner, _ in _owned_shapes(scene)] + [None] * _stop_count(scene)
     return np.array([UNSTATED if e is None else e for e in given], np.float64)
 
 
-def restitution_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
+def restitution_by_pair(scene: Scene, pairs: Pairs) -> Floats:
     """Return e of each candidate pair (k, 2) of shapes.
 
     The smaller of the two given values counts. If only one of the two gives a value, that value counts; if neither
     does, `contact.restitution` counts. So equal values are kept to the last bit, and a soft body is soft against
     everything.
     """
-    own = restitution_by_shape(scene)
-    smaller = np.minimum(own[pairs[:, 0]], own[pairs[:, 1]])
+    smaller = restitution_by_shape(scene)[pairs].min(axis=1)
     return np.where(smaller > 1.0, scene.contact.restitution, smaller)
 
 
-def restitutions_of(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
+def restitutions_of(scene: Scene, pairs: Pairs) -> Floats:
     """Return the distinct values of e among the candidate pairs (k, 2) of shapes and the joints' stops, ascending."""
     stops = [scene.contact.restitution] if _stop_count(scene) else []
     return np.unique(np.concatenate([restitution_by_pair(scene, pairs), stops]))
@@ -272,6 +242,10 @@ class Frictions(NamedTuple):
     class_of_shape: NDArray[np.int64]
     table: Floats
 
+    def by_pair(self, pairs: Pairs) -> Floats:
+        """Return mu of each pair (k, 2) of shapes."""
+        return self.table[self.class_of_shape[pairs[:, 0]], self.class_of_shape[pairs[:, 1]]]
+
 
 def frictions_of(scene: Scene) -> Frictions:
     """Return mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow, with mu = 0.
@@ -280,61 +254,16 @@ def frictions_of(scene: Scene) -> Frictions:
     one of the two gives a value, that value counts; if neither does, `contact.friction` counts. So equal values are
     kept to the last bit, and everything slides on a body with mu = 0.
     """
-    owners = [(body.name, body.friction) for body in scene.bodies for _ in body.shapes]
-    owners += [(wall.name, wall.friction) for wall in scene.walls]
     pairs = {frozenset(pair.between): pair.friction for pair in scene.contact.friction_pairs}
     paired = frozenset().union(*pairs)
     alike: dict[tuple[str, float | None], int] = {}
-    classes = [alike.setdefault((name if name in paired else "", own), len(alike)) for name, own in owners]
+    classes = [alike.setdefault((owner.name if owner.name in paired else "", owner.friction), len(alike))
+               for _, owner, _ in _owned_shapes(scene)]
     stops = _stop_count(scene)
     table = np.zeros((len(alike) + (stops > 0),) * 2)
     for (a, first), i in alike.items():
         for (b, second), k in alike.items():
-            table[i, k] = pairs.get(frozenset({a, b}), _mean_friction(first, second, scene.contact.friction))
+            own = [mu for mu in (first, second) if mu is not None] or [scene.contact.friction]
+            mean = own[0] if own[0] == own[-1] else math.sqrt(own[0] * own[-1])
+            table[i, k] = pairs.get(frozenset({a, b}), mean)
     return Frictions(np.array(classes + [len(alike)] * stops, np.int64), table)
-
-
-def _mean_friction(first: float | None, second: float | None, otherwise: float) -> float:
-    if first is None or second is None:
-        given = second if first is None else first
-        return otherwise if given is None else given
-    return first if first == second else math.sqrt(first * second)
-
-
-def friction_by_pair(scene: Scene, pairs: NDArray[np.int32]) -> Floats:
-    """Return mu of each pair (k, 2) of shapes (see `frictions_of`)."""
-    return friction_of_pairs(frictions_of(scene), pairs)
-
-
-def friction_of_pairs(frictions: Frictions, pairs: NDArray[np.int32]) -> Floats:
-    """Return mu of each pair (k, 2) of shapes."""
-    classes, table = frictions
-    return table[classes[pairs[:, 0]], classes[pairs[:, 1]]]
-
-
-def largest_friction(scene: Scene) -> float:
-    """Return the largest mu among all values that the scene gives."""
-    things = (*scene.bodies, *scene.walls)
-    return max([scene.contact.friction, *(pair.friction for pair in scene.contact.friction_pairs),
-                *(thing.friction for thing in things if thing.friction is not None)])
-
-
-def joint_damping_of(scene: Scene) -> Floats:
-    """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
-    given = [body.joint_damping or (0.0,) * KINDS[body.joint].nv for body in scene.bodies]
-    return np.array([x for each in given for x in each], np.float64)
-
-
-def one_restitution(scene: Scene, pairs: NDArray[np.int32]) -> float:
-    """Return the common e of all pairs, for laws that need one value.
-
-    Raises
-    ------
-    ArgumentError
-        The pairs have different values.
-    """
-    values = restitutions_of(scene, pairs)
-    if len(values) > 1:
-        found = f"one restitution for all contacts; here {values[0]:g} to {values[-1]:g}"
-        raise ArgumentError("scene", scene.name, found)
-    return float(values[0]) if len(values) else float(scene.contact.restitution)

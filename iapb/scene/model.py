@@ -9,18 +9,17 @@ import bisect
 import copy
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from collections.abc import Iterable, Iterator, Mapping, Set
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 from pydantic.json_schema import models_json_schema
-from pydantic_core import InitErrorDetails
 
 from iapb.errors import ArgumentError, SceneError
 from iapb.names import one_of
 from iapb.scene.across import across_parts
 from iapb.scene.bodies import INERTIAL, ORIGIN, Body, SpatialBody, SpatialWall, Wall
-from iapb.scene.document import block_lines, read_document
+from iapb.scene.document import Document, block_lines
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
     Fraction,
@@ -28,12 +27,14 @@ from iapb.scene.parts import (
     NonNegative,
     Number,
     Part,
+    Path,
     Positive,
     Text,
+    Truth,
     Vector2,
     Vector3,
-    expectation,
     mistakes_of,
+    require,
 )
 from iapb.scene.robots import Robot
 
@@ -58,12 +59,12 @@ class FrictionPair(Part):
 class Contact(Part):
     """How contacts behave. The defaults are the paper's values; where it gives none, they are this project's."""
 
-    auto: Annotated[bool, Field(strict=True)] = Field(
+    auto: Truth = Field(
         False,
         description="true: stiffness, damping and coherence_distance are chosen from masses, sizes, gravity and rate "
         "where they are not given; contact: auto is short for it; default false",
     )
-    resting_start: Annotated[bool, Field(strict=True)] = Field(
+    resting_start: Truth = Field(
         False,
         description="true: what touches at the start begins where springs and friction hold it; default false",
     )
@@ -90,9 +91,7 @@ class Contact(Part):
         1e-3,
         description="v_threshold of (6) [m/s]: below it regularised friction grows linearly; default 1e-3, ours",
     )
-    restitution: Fraction = Field(
-        0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0"
-    )
+    restitution: Fraction = Field(0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0")
     approach_velocity: NonNegative = Field(
         1e-6, description="v_approach [m/s]: contacts that approach faster collide; default 1e-6, ours"
     )
@@ -108,7 +107,7 @@ class Contact(Part):
         "relative",
         description="rows of a collision of two moving bodies: relative (12), default; per_body (13)-(14)",
     )
-    self_collisions: Annotated[bool, Field(strict=True)] = Field(
+    self_collisions: Truth = Field(
         False, description="whether bodies of one tree, not neighbours in it, can touch; default false"
     )
 
@@ -126,6 +125,11 @@ class Contact(Part):
         return made
 
 
+_WORDS: dict[Any, Any] = {"auto": {"auto": True}, "paper": {"forces": "paper"}}
+_SHORT = BeforeValidator(lambda given: _WORDS.get(given, given) if isinstance(given, str) else given,
+                         json_schema_input_type=Literal["auto", "paper"] | Contact)
+
+
 class Hand(Part):
     """The hand: a force on one body. A constant force is the worst case for stability (paper, section VI).
 
@@ -133,9 +137,7 @@ class Hand(Part):
     """
 
     body: Name = Field(description="the body that the hand holds")
-    point: Vector2 = Field(
-        (0.0, 0.0), description="where it holds it [m], body axes; default: the body's origin"
-    )
+    point: Vector2 = Field((0.0, 0.0), description="where it holds it [m], body axes; default: the body's origin")
     force: tuple[Number, Number, Number] = Field(
         (0.0, 0.0, 0.0), description="constant force and torque [N, N, N m], world axes; default: none"
     )
@@ -148,23 +150,18 @@ class Hand(Part):
         "0.5*sin(2*pi*t); default: none"
     )
 
-    @field_validator("force_table")
+    @field_validator("force_table", "force_function")
     @classmethod
-    def _rows_in_time(cls, rows: tuple[tuple[float, ...], ...], info: ValidationInfo) -> tuple[tuple[float, ...], ...]:
-        width = 1 + len(cls.model_fields["force"].default)
-        if any(len(row) != width for row in rows):
-            raise expectation(f"rows of {width} numbers: the time, then {width - 1} as in force")
-        if any(not after[0] > before[0] for before, after in itertools.pairwise(rows)):
-            raise expectation("rows in the order of their times, none twice")
-        return rows
-
-    @field_validator("force_function")
-    @classmethod
-    def _one_text_for_each(cls, texts: tuple[str, ...]) -> tuple[str, ...]:
+    def _like_the_force(cls, given: Any, info: ValidationInfo) -> Any:
         count = len(cls.model_fields["force"].default)
-        if texts and len(texts) != count:
-            raise expectation(f"{count} texts, one for each number of force")
-        return texts
+        if info.field_name == "force_function":
+            require(len(given) in (0, count), f"{count} texts, one for each number of force")
+            return given
+        require(all(len(row) == 1 + count for row in given),
+                f"rows of {1 + count} numbers: the time, then {count} as in force")
+        require(all(after[0] > before[0] for before, after in itertools.pairwise(given)),
+                "rows in the order of their times, none twice")
+        return given
 
     @property
     def changes(self) -> bool:
@@ -256,9 +253,7 @@ class Scene(Part):
     name: Name = Field(description="the scene's name; runs are filed under it")
     title: Text = Field("", description="one line for reports")
     source: Text = Field("", description="where the scene comes from")
-    rate: Annotated[Positive, Field(le=MAX_RATE)] = Field(
-        description="simulation rate [Hz]; the step is 1/rate"
-    )
+    rate: Annotated[Positive, Field(le=MAX_RATE)] = Field(description="simulation rate [Hz]; the step is 1/rate")
     duration: Positive = Field(description="simulated time [s]")
     integrator: Literal["momentum", "semi_implicit_euler", "midpoint", "runge_kutta_4"] | None = Field(
         None, description="how a step moves the bodies; default momentum, which keeps linear and angular momentum; in "
@@ -268,10 +263,8 @@ class Scene(Part):
     bodies: Annotated[tuple[Body, ...], Field(min_length=1, max_length=MAX_BODIES)] = Field(
         description="what can move, each after its parent"
     )
-    walls: Annotated[tuple[Wall, ...], Field(max_length=MAX_WALLS)] = Field(
-        (), description="the static world"
-    )
-    contact: Contact = Field(
+    walls: Annotated[tuple[Wall, ...], Field(max_length=MAX_WALLS)] = Field((), description="the static world")
+    contact: Annotated[Contact, _SHORT] = Field(
         default_factory=lambda: Contact.model_validate({}), description="how contacts behave"
     )
     hand: Hand | None = Field(None, description="the hand that holds the tool; default: nobody")
@@ -281,25 +274,18 @@ class Scene(Part):
     )
 
     _source_text: str = PrivateAttr("")
-    _remark: str = PrivateAttr("")  # comment for a text that is not written yet
     _file: str = PrivateAttr("")  # file that the text was read from, if any
-
-    @field_validator("contact", mode="before")
-    @classmethod
-    def _spelt_out(cls, contact: Any) -> Any:
-        return {"auto": {"auto": True}, "paper": {"forces": "paper"}}.get(contact, contact) if isinstance(
-            contact, str) else contact
 
     @field_validator("duration")
     @classmethod
     def _ends(cls, duration: float, info: ValidationInfo) -> float:
-        rate = info.data.get("rate")
-        if rate is not None and not 1.0 <= round(duration * rate, 6) <= MAX_STEPS:
-            raise expectation(f"between 1 and {MAX_STEPS} steps; duration times rate is {duration * rate:g}")
+        steps = duration * info.data.get("rate", 1.0 / duration)
+        expected = f"between 1 and {MAX_STEPS} steps; duration times rate is {steps:g}"
+        require(1.0 <= round(steps, 6) <= MAX_STEPS, expected)
         return duration
 
     @classmethod
-    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
+    def across_fields(cls, given: Any) -> Iterable[tuple[Path, Any, str]]:
         return across_parts(given)
 
     @property
@@ -319,10 +305,10 @@ class Scene(Part):
         return self.integrator or ("semi_implicit_euler" if plane_of_paper else "momentum")
 
     @property
-    def names_friction(self) -> bool:
-        """Whether the scene gives a coefficient of friction above zero anywhere."""
-        own = [part.friction for part in (*self.bodies, *self.walls, *self.contact.friction_pairs)]
-        return any(value is not None and value > 0.0 for value in (self.contact.friction, *own))
+    def largest_friction(self) -> float:
+        """The largest coefficient of friction [1] that the scene gives anywhere."""
+        parts = (self.contact, *self.contact.friction_pairs, *self.bodies, *self.walls)
+        return max(part.friction for part in parts if part.friction is not None)
 
     @property
     def chosen_fields(self) -> tuple[str, ...]:
@@ -333,8 +319,6 @@ class Scene(Part):
     @property
     def source_text(self) -> str:
         """The YAML text of this scene."""
-        if self._remark:
-            self._source_text, self._remark = scene_text(self, self._remark), ""
         return self._source_text
 
     def __eq__(self, other: Any) -> bool:
@@ -345,7 +329,7 @@ class Scene(Part):
         """Return the place of a field as "file:line:column: "; empty if the scene was not read from a file."""
         if not self._file:
             return ""
-        line, column = read_document(self._source_text)[0].stands_at(path)
+        line, column = Document(self._source_text).place(path)
         return f"{self._file}:{line}:{column}: "
 
     def resolved(self) -> dict[str, Any]:
@@ -383,37 +367,8 @@ class Scene(Part):
             made = type(self).model_validate(plain)
         except ValidationError as failure:
             raise SceneError(mistakes_of(failure, f"scene {self.name} with new values", plain)) from failure
-        made._remark = f"{self.name} with new values for {', '.join(values) or 'nothing'}"
+        made._source_text = scene_text(made, f"{self.name} with new values for {', '.join(values) or 'nothing'}")
         return made
-
-
-    def with_hand_force(self, function: Callable[[float], Any]) -> Self:
-        """Return a copy whose hand pushes with function(t) in place of its force, at the start t [s] of each step.
-
-        The copy has the values in `hand.force_table`, so that a run records them.
-
-        Parameters
-        ----------
-        function
-            maps the time [s] to three numbers in the plane or six in space, as in `hand.force`.
-
-        Raises
-        ------
-        ArgumentError
-            the scene has no hand or more than MAX_ROWS steps, or the function does not return a list of numbers.
-        SceneError
-            the values are not valid forces.
-        """
-        if self.hand is None or self.steps > MAX_ROWS:
-            raise ArgumentError("scene", self.name, f"a scene with a hand and at most {MAX_ROWS:,} steps")
-        rows = []
-        for k in range(self.steps):
-            force = _plain(function(k * self.step))
-            if not isinstance(force, list | tuple):
-                raise ArgumentError("function", force, f"a list of {len(self.hand.force)} numbers as its value")
-            rows.append([k * self.step, *force])
-        none = [0.0] * len(self.hand.force)
-        return self.with_values({"hand.force": none, "hand.force_table": rows, "hand.force_function": []})
 
 
 class SpatialScene(Scene):
@@ -444,19 +399,16 @@ def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
     """Set a value at a dotted path of a resolved scene, without checks; missing sections are added."""
     if not isinstance(path, str) or not path:
         raise ArgumentError("values", path, "dotted paths as keys, such as contact.friction")
-    steps = path.split(".")
+    *steps, last = path.split(".")
     place: Any = plain
-    for i, step in enumerate(steps):
+    for step in steps:
         key = _key(place, step, path)
-        if i == len(steps) - 1:
-            if key == "density" and isinstance(place, dict):  # mass, centre of mass and inertia follow from it
-                for name in INERTIAL:
-                    place.pop(name, None)
-            place[key] = _plain(value)
-            return
         if isinstance(place, dict) and place.get(key) is None:
             place[key] = {}
         place = place[key]
+    for replaced in INERTIAL if last == "density" and isinstance(place, dict) else ():
+        place.pop(replaced, None)
+    place[_key(place, last, path)] = _plain(value)
 
 
 def _plain(value: Any) -> Any:
@@ -481,11 +433,7 @@ def _key(place: Any, step: str, path: str) -> str | int:
     raise ArgumentError("values", path, one_of(step, known, f"at {step!r} one of: "))
 
 
-# The JSON Schema of scene files, for editors: planar scenes, and scenes in space with their robots.
-
-
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-_HERE = "#/$defs/"
 
 
 def scene_schema() -> dict[str, Any]:
@@ -494,30 +442,15 @@ def scene_schema() -> dict[str, Any]:
     As in the reader, a file with the field `dimensions` is a scene in space, any other file a planar scene.
     """
     _, schema = models_json_schema([(model, "validation") for model in (Scene, SpatialScene, Robot)])
-    parts = schema["$defs"]
-    for name in ("Scene", "SpatialScene"):
-        contact = parts[name]["properties"]["contact"]
-        words = {"enum": ["auto", "paper"]}
-        parts[name]["properties"]["contact"] = {"anyOf": [{"$ref": contact.pop("$ref")}, words], **contact}
-    parts["SpatialScene"] = _with_robots(parts["SpatialScene"])
+    space = schema["$defs"]["SpatialScene"]  # with bodies, or robots that the reader turns into bodies
+    space["properties"]["robots"] = {"type": "array", "items": {"$ref": "#/$defs/Robot"},
+                                     "description": "URDF files that become bodies; default: none"}
+    least = {"minItems": space["properties"]["bodies"].pop("minItems")}
+    space["required"].remove("bodies")
+    space["anyOf"] = [{"required": ["bodies"], "properties": {"bodies": least}}, {"required": ["robots"]}]
     return {
         "$schema": DIALECT, "title": "Scene file", "type": "object",
         "if": {"required": ["dimensions"]},
-        "then": {"$ref": f"{_HERE}SpatialScene"}, "else": {"$ref": f"{_HERE}Scene"},
-        "$defs": parts,
-    }
-
-
-def _with_robots(space: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of scenes in space with the field `robots`, which the reader turns into bodies.
-
-    A scene needs a body or a robot. With robots, `bodies` may be empty or left out.
-    """
-    robots = {"type": "array", "items": {"$ref": f"{_HERE}Robot"},
-              "description": "URDF files that become bodies; default: none"}
-    bodies = {name: value for name, value in space["properties"]["bodies"].items() if name != "minItems"}
-    return space | {
-        "properties": space["properties"] | {"bodies": bodies, "robots": robots},
-        "required": [name for name in space["required"] if name != "bodies"],
-        "anyOf": [{"required": ["bodies"], "properties": {"bodies": {"minItems": 1}}}, {"required": ["robots"]}],
+        "then": {"$ref": "#/$defs/SpatialScene"}, "else": {"$ref": "#/$defs/Scene"},
+        "$defs": schema["$defs"],
     }

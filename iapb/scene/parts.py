@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
@@ -32,11 +32,12 @@ OwnFriction = Annotated[
 ]
 Vector2 = tuple[Number, Number]
 Vector3 = tuple[Number, Number, Number]
+Truth = Annotated[bool, Field(strict=True)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=True)]
 Text = Annotated[str, Field(max_length=2000, strict=True)]
 
-
 OURS, MISSING = "scene", "scene_missing"  # error types of this project; their message says what was expected
+Path = tuple[str | int, ...]  # of a value, such as ("bodies", 0, "mass")
 
 
 def expectation(expected: str, kind: str = OURS) -> PydanticCustomError:
@@ -44,9 +45,10 @@ def expectation(expected: str, kind: str = OURS) -> PydanticCustomError:
     return PydanticCustomError(kind, "{expected}", {"expected": expected})
 
 
-def located(where: tuple[str | int, ...], value: Any, expected: str, kind: str = OURS) -> InitErrorDetails:
-    """Return one mistake at a path, for a check across several fields."""
-    return InitErrorDetails(type=expectation(expected, kind), loc=where, input=value)
+def require(holds: bool, expected: str) -> None:
+    """Raise the error for a field that breaks a rule of this project."""
+    if not holds:
+        raise expectation(expected)
 
 
 class Part(BaseModel):
@@ -55,52 +57,49 @@ class Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
     @classmethod
-    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
-        """Return the mistakes that concern several fields together."""
-        return []
+    def across_fields(cls, given: Any) -> Iterable[tuple[Path, Any, str]]:
+        """Return path, value and expectation of each mistake that concerns several fields together."""
+        return ()
 
     @model_validator(mode="wrap")
     @classmethod
     def _all_at_once(cls, given: Any, validate: ModelWrapValidatorHandler[Self]) -> Self:
-        """Report mistakes of single fields and across fields together; for an unknown field, list the known ones."""
-        mistakes: list[InitErrorDetails] = []
+        """Report mistakes of single fields and across fields together, and say what was expected."""
+        mistakes = [InitErrorDetails(type=expectation(expected), loc=path, input=value)
+                    for path, value, expected in cls.across_fields(given)]
         try:
             part = validate(given)
         except ValidationError as failure:
-            mistakes = [
-                cls._readable(error)
-                for error in failure.errors(include_url=False)
-                if not _follows_from_others(error)
-            ]
-        mistakes += cls.across_fields(given)
+            # a list also counts as too short if its invalid items were left out
+            mistakes += [cls._explained(error) for error in failure.errors(include_url=False)
+                         if error["type"] != "too_short" or len(error["input"]) < error["ctx"]["min_length"]]
         if mistakes:
             raise ValidationError.from_exception_data(cls.__name__, mistakes)
         return part
 
     @classmethod
-    def _readable(cls, error: Any) -> InitErrorDetails:
-        """Turn pydantic's error into one whose message says what was expected."""
-        where, kind, value, expected = error["loc"], error["type"], error["input"], error["msg"]
-        if kind not in (OURS, MISSING):
-            expected = expected_of(error)
+    def _explained(cls, error: Any) -> InitErrorDetails:
+        """Turn pydantic's error into one whose message says what was expected, in terms of the scene file."""
+        kind, where, words = error["type"], error["loc"], error.get("ctx", {})
+        expected, value, missing = error["msg"], error["input"], MISSING if kind in ("missing", MISSING) else OURS
+        if kind in _EXPECTED:
+            expected = _EXPECTED[kind].format(**words)
+            listed = re.findall("'([^']*)'", words.get("expected_tags", words.get("expected", "")))
+            near = nearest(words.get("tag", value), listed) if listed else ""
+            expected += f"; did you mean {near}?" if near else ""
         if kind == "extra_forbidden" and len(where) == 1:
-            expected = _known_fields(str(where[0]), tuple(cls.model_fields))
+            near = nearest(where[0], cls.model_fields)
+            expected = f"{KNOWN_FIELDS}{f' (did you mean {near}?)' if near else ''}: {', '.join(cls.model_fields)}"
         if kind == "missing":
             field = cls.model_fields.get(str(where[0])) if len(where) == 1 else None
             expected = f"this field: {field.description}" if field else "one item more in this list"
-        if kind == "union_tag_not_found":
-            where, kind = (*where, "kind"), MISSING
-        if kind == "union_tag_invalid":
-            where, value = (*where, "kind"), value["kind"]
-        return located(where, value, expected, MISSING if kind in ("missing", MISSING) else OURS)
+        if kind.startswith("union_tag"):
+            where, missing = (*where, "kind"), MISSING if kind == "union_tag_not_found" else OURS
+            value = value.get("kind")
+        return InitErrorDetails(type=expectation(expected, missing), loc=where, input=value)
 
 
-def _known_fields(wrong: str, known: tuple[str, ...]) -> str:
-    near = nearest(wrong, known)
-    guess = f" (did you mean {near}?)" if near else ""
-    return f"one of the known fields{guess}: {', '.join(known)}"
-
-
+KNOWN_FIELDS = "one of the known fields"
 _EXPECTED = {
     "float_type": "a number",
     "int_type": "a whole number",
@@ -122,66 +121,35 @@ _EXPECTED = {
     "union_tag_invalid": "one of {expected_tags}",
 }
 
-
-def expected_of(error: Any) -> str:
-    """Return what was expected, in terms of the scene file."""
-    template = _EXPECTED.get(error["type"])
-    if template is None:
-        return str(error["msg"])
-    return template.format(**error.get("ctx", {})) + _guess(error)
+StandsAt = Callable[[Path, bool], tuple[int, int]]
+_ABSENT = object()
 
 
-def _guess(error: Any) -> str:
-    """Return a hint with the similar word, if one of a few words was expected and one is similar."""
-    words = error.get("ctx", {})
-    listed = re.findall("'([^']*)'", words.get("expected_tags", words.get("expected", "")))
-    near = nearest(words.get("tag", error["input"]), listed) if listed else ""
-    return f"; did you mean {near}?" if near else ""
+def mistakes_of(failure: ValidationError, file: str, read: Any, place: StandsAt | None = None, inside: Path = ()
+                ) -> list[Mistake]:
+    """Return pydantic's errors about the values at a path `inside` those `read` as mistakes.
+
+    `place` maps a path, and whether its key is meant, to line and column; without it they are 0.
+    """
+    found = []
+    for error in failure.errors(include_url=False):
+        path: list[str | int] = []
+        here = read
+        for key in (*inside, *error["loc"]):
+            if isinstance(here, dict) and key not in here and key == here.get("kind"):
+                continue  # pydantic inserts the kind of a shape
+            path.append(key)
+            try:
+                here = here[key]
+            except (KeyError, IndexError, TypeError):
+                here = _ABSENT
+        value = "(missing)" if error["type"] == MISSING else shown(error["input"]) + " (default)" * (here is _ABSENT)
+        at = place(tuple(path), error["msg"].startswith(KNOWN_FIELDS)) if place else (0, 0)
+        found.append(Mistake(file, *at, written(path), value, error["msg"]))
+    return found
 
 
-def _follows_from_others(error: Any) -> bool:
-    """Return whether a list counts as too short only because its invalid items were left out."""
-    given = error["input"]
-    return error["type"] == "too_short" and len(given) >= error["ctx"]["min_length"]
-
-
-# Mistakes with their place in the file
-
-Place = tuple[str | int, ...]
-StandsAt = Callable[[Place, bool], tuple[int, int]]  # path, whether its key is meant -> line and column
-
-
-def mistakes_of(failure: ValidationError, file: str, read: Any, stands_at: StandsAt | None = None) -> list[Mistake]:
-    """Return pydantic's errors about the values `read` as mistakes; the line is 0 without `stands_at`."""
-    return [_mistake(error, file, read, stands_at) for error in failure.errors(include_url=False)]
-
-
-def _mistake(error: Any, file: str, read: Any, stands_at: StandsAt | None) -> Mistake:
-    path, exists = _field_path(error["loc"], read)
-    missing = error["type"] == MISSING
-    value = "(missing)" if missing else shown(error["input"]) + ("" if exists else " (default)")
-    line, column = stands_at(path, error["msg"].startswith("one of the known fields")) if stands_at else (0, 0)
-    return Mistake(file, line, column, written(path), value, error["msg"])
-
-
-def _field_path(where: Place, read: Any) -> tuple[Place, bool]:
-    """Return the path in the file, without the shape kinds that pydantic inserts, and whether it exists there."""
-    path: list[str | int] = []
-    exists = True
-    for key in where:
-        if isinstance(read, dict) and key not in read and key == read.get("kind"):
-            continue
-        path.append(key)
-        try:
-            read = read[key]
-        except (KeyError, IndexError, TypeError):
-            read, exists = None, False
-    return tuple(path), exists
-
-
-def written(path: Place) -> str:
+def written(path: Iterable[str | int]) -> str:
     """Return a path as it is written in messages, such as ``bodies[0].mass``."""
-    text = ""
-    for step in path:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
-    return text or "(file)"
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    return text.removeprefix(".") or "(file)"

@@ -9,9 +9,9 @@ from pydantic import ValidationError
 
 from iapb.errors import ArgumentError, Mistake, SceneError, shown
 from iapb.names import nearest, one_of
-from iapb.scene.document import MAX_CHARACTERS, DocumentError, Node, read_document
+from iapb.scene.document import MAX_CHARACTERS, Document
 from iapb.scene.model import Scene, scene_kind, scene_text
-from iapb.scene.parts import mistakes_of, written
+from iapb.scene.parts import mistakes_of
 from iapb.scene.robots import with_robots
 
 
@@ -100,10 +100,7 @@ def load_scene(path: str | Path) -> Scene:
     return scene_from_text(text, str(path))
 
 
-_TEXT = "(text)"  # file name of a text without a file
-
-
-def scene_from_text(text: str, file: str = _TEXT) -> Scene:
+def scene_from_text(text: str, file: str = "(text)") -> Scene:
     """Read a scene from YAML text; `file` is the file name in the messages of mistakes.
 
     Raises
@@ -111,31 +108,17 @@ def scene_from_text(text: str, file: str = _TEXT) -> Scene:
     SceneError
         the text is not a valid scene; the error lists all mistakes.
     """
-    root, mistakes = read_values(text, file)
-    given, wrong = with_robots(root.value, file, root.stands_at)
+    document = Document(text, file)
+    given, mistakes = with_robots(document)
     try:
         scene = scene_kind(given).model_validate(given)
     except ValidationError as failure:
-        mistakes += mistakes_of(failure, file, root.value, root.stands_at)
-    mistakes += wrong
+        mistakes += mistakes_of(failure, document.file, document.value, document.place)
+    mistakes += document.mistakes
     if mistakes:
         raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)))
-    scene._file = file if given is root.value and file != _TEXT else ""
-    scene._source_text = text if given is root.value else scene_text(scene, f"{scene.name} with its robots as bodies")
+    if given is document.value:
+        scene._source_text, scene._file = text, file if file != "(text)" else ""
+    else:
+        scene._source_text = scene_text(scene, f"{scene.name} with its robots as bodies")
     return scene
-
-
-def read_values(text: str, file: str, what: str = "scene") -> tuple[Node, list[Mistake]]:
-    """Return the values of a YAML text with their places, and a mistake for each repeated field.
-
-    Raises
-    ------
-    SceneError
-        the text is not a document of plain values; `what` names the expected kind of file.
-    """
-    try:
-        root, repeated = read_document(text)
-    except DocumentError as failure:
-        mistake = Mistake(file, *failure.place, "(file)", failure.value, failure.expected)
-        raise SceneError([mistake], what) from failure
-    return root, [Mistake(file, *r.place, written(r.path), "(repeated)", "each field once") for r in repeated]

@@ -16,7 +16,6 @@ its folder.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,8 +25,9 @@ from pydantic import Field, ValidationError
 from iapb.errors import ArgumentError, Mistake, shown
 from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
-from iapb.scene.bodies import ORIGIN, SpatialShape
-from iapb.scene.parts import Name, Number, Part, Place, Text, Vector3, written
+from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
+from iapb.scene.document import Document
+from iapb.scene.parts import Name, Number, Part, Text, Vector3, mistakes_of
 
 HELD = ("box", "sphere")  # URDF geometries that the compiled narrow phase supports
 MAX_ROBOTS = 100  # in one scene; each one is a file to read
@@ -56,6 +56,30 @@ class Robot(Part):
     velocity: dict[str, tuple[Number, ...]] = Field(default_factory=dict, description="the same for velocities")
 
 
+def with_robots(document: Document) -> tuple[Any, list[Mistake]]:
+    """Return the plain values of a scene with its robots turned into bodies, and the mistakes found."""
+    given, mistakes, file = document.value, [], document.file
+    if not (isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)):
+        return given, []
+    listed, robots = given.get("bodies", []), given["robots"]
+    if len(robots) > MAX_ROBOTS:
+        place = document.place(("robots",))
+        return given, [Mistake(file, *place, "robots", f"{len(robots)} robots", f"at most {MAX_ROBOTS} robots")]
+    bodies: list[dict[str, Any]] = []
+    for i, item in enumerate(robots):
+        try:
+            bodies += bodies_of(Robot.model_validate(item), Path(file).parent)
+        except ValidationError as failure:
+            mistakes += mistakes_of(failure, file, given, document.place, ("robots", i))
+        except ArgumentError as failure:
+            field = failure.argument.split(" ")[0]
+            place = document.place(("robots", i, field if field in Robot.model_fields else "urdf"))
+            where = f"robots[{i}].{failure.argument}"
+            mistakes.append(Mistake(file, *place, where, shown(failure.value), failure.expected))
+    kept = {key: value for key, value in given.items() if key != "robots"}
+    return kept | {"bodies": [*(listed or ()), *bodies] if isinstance(listed, list | None) else listed}, mistakes
+
+
 def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
     """Return the robot's links as plain bodies of a spatial scene.
 
@@ -65,105 +89,63 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
         The path leads out of the folder, the file is not a URDF robot, a named link does not exist, or the
         <collision> of a link is neither box nor sphere.
     """
-    from iapb.mechanics.urdf import read_urdf  # brings numba along
+    from iapb.linalg import product  # brings numba along
+    from iapb.mechanics.rotations import angles_of, rotation_of
+    from iapb.mechanics.urdf import read_collisions, read_urdf
 
-    path = urdf_path(robot.urdf, folder)
-    links = read_urdf(path, robot.floating)
-    names = {link.name for link in links}
+    path, root = Path(robot.urdf), folder.resolve()
+    leads_out = "\0" in robot.urdf or path.is_absolute() or ".." in path.parts
+    if leads_out or not (root / path).resolve().is_relative_to(root):  # after following symbolic links
+        raise ArgumentError("urdf", robot.urdf, "a relative path inside the scene's folder")
+    links = read_urdf(root / path, robot.floating)
+    names = sorted(link.name for link in links)
     for field in ("shapes", "position", "velocity"):
-        for link in getattr(robot, field):
-            if link not in names:
-                expected = one_of(link, sorted(names), "a link of it: ")
-                raise ArgumentError(f"{field} of robot {robot.name}", link, expected)
-    shapes = {link: [shape.model_dump(mode="json") for shape in given] for link, given in robot.shapes.items()}
+        for name in getattr(robot, field):
+            if name not in names:
+                raise ArgumentError(f"{field} of robot {robot.name}", name, one_of(name, names, "a link of it: "))
+    shapes: dict[str, Any] = {link: [shape.model_dump(mode="json") for shape in given]
+                              for link, given in robot.shapes.items()}
     if robot.collisions == "urdf":
-        shapes = _collisions_of(robot, path) | shapes
-    return [_plain_body(robot, link, shapes.get(link.name, [])) for link in links]
-
-
-def _collisions_of(robot: Robot, path: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the URDF file's collision shapes by link, for the links without an entry in `shapes`."""
-    from iapb.mechanics.urdf import read_collisions
-
-    read = {link: shapes for link, shapes in read_collisions(path).items() if link not in robot.shapes}
-    foreign = [f"{link} <{shape.kind}>" for link, shapes in read.items() for shape in shapes if shape.kind not in HELD]
-    if foreign:
-        expected = "links with boxes and spheres; give the others boxes and spheres, or [], under shapes"
-        raise ArgumentError("collisions", ", ".join(dict.fromkeys(foreign)), expected)
-    return {link: [_plain_shape(shape) for shape in shapes] for link, shapes in read.items()}
+        read = {link: given for link, given in read_collisions(root / path).items() if link not in shapes}
+        foreign = {f"{link} <{shape.kind}>": 0 for link, given in read.items() for shape in given
+                   if shape.kind not in HELD}
+        if foreign:
+            expected = "links with boxes and spheres; give the others boxes and spheres, or [], under shapes"
+            raise ArgumentError("collisions", ", ".join(foreign), expected)
+        shapes |= {link: [_plain_shape(shape) for shape in given] for link, given in read.items()}
+    bodies = []
+    for link in links:
+        rotation, origin = link.placement
+        if link.parent is None:
+            turn = rotation_of(robot.rpy)
+            rotation, origin = product(turn, rotation), product(turn, origin) + np.array(robot.origin)
+        kind = KINDS[link.joint.kind]
+        bodies.append({
+            "name": _body_name(robot, link.name),
+            "parent": WORLD if link.parent is None else _body_name(robot, link.parent),
+            "joint": kind.name,
+            "axis": list(link.joint.axis) if kind.name in SpatialBody.with_axis else None,
+            "origin": origin.tolist(),
+            "rpy": list(angles_of(rotation)),
+            "center_of_mass": link.center_of_mass.tolist(),
+            "mass": link.mass,
+            "inertia": link.inertia.tolist(),
+            "shapes": shapes.get(link.name, []),
+            "position": list(robot.position.get(link.name, kind.neutral)),
+            "velocity": list(robot.velocity.get(link.name, ())),
+        })
+    return bodies
 
 
 def _plain_shape(shape: Any) -> dict[str, Any]:
     from iapb.mechanics.rotations import angles_of  # brings numba along
 
-    center = shape.center.tolist()
+    plain = {"kind": shape.kind, "center": shape.center.tolist()}
     if shape.kind == "sphere":
-        return {"kind": "sphere", "radius": float(shape.lengths[0]), "center": center}
-    return {"kind": "box", "size": shape.lengths.tolist(), "center": center, "rpy": list(angles_of(shape.rotation))}
+        return plain | {"radius": float(shape.lengths[0])}
+    return plain | {"size": shape.lengths.tolist(), "rpy": list(angles_of(shape.rotation))}
 
 
-def urdf_path(text: str, folder: Path) -> Path:
-    """Return the file at a relative path; after following symbolic links it must be inside the folder."""
-    path, root = Path(text), folder.resolve()
-    leads_out = "\0" in text or path.is_absolute() or ".." in path.parts
-    if leads_out or not (root / path).resolve().is_relative_to(root):
-        raise ArgumentError("urdf", text, "a relative path inside the scene's folder")
-    return root / path
-
-
-def _plain_body(robot: Robot, link: Any, shapes: list[dict[str, Any]]) -> dict[str, Any]:
-    from iapb.linalg import product  # brings numba along
-    from iapb.mechanics.rotations import angles_of, rotation_of
-
-    rotation, origin = link.placement
-    if link.parent is None:
-        turn = rotation_of(robot.rpy)
-        rotation, origin = product(turn, rotation), product(turn, origin) + np.array(robot.origin)
-    body = {
-        "name": body_name(robot.name, link.name),
-        "parent": "world" if link.parent is None else body_name(robot.name, link.parent),
-        "joint": link.joint.kind,
-        "origin": origin.tolist(),
-        "rpy": list(angles_of(rotation)),
-        "center_of_mass": link.center_of_mass.tolist(),
-        "mass": link.mass,
-        "inertia": link.inertia.tolist(),
-        "shapes": shapes,
-        "position": list(robot.position.get(link.name, KINDS[link.joint.kind].neutral)),
-        "velocity": list(robot.velocity.get(link.name, ())),
-    }
-    if link.joint.kind in ("revolute", "continuous", "prismatic"):
-        body["axis"] = list(link.joint.axis)
-    return body
-
-
-def body_name(robot: str, link: str) -> str:
+def _body_name(robot: Robot, link: str) -> str:
     """Return the name of a link's body: <robot>_<link>, with _ for characters that are not allowed (link_3.0)."""
-    return re.sub(r"[^A-Za-z0-9_-]", "_", f"{robot}_{link}")
-
-
-def with_robots(given: Any, file: str, stands_at: Callable[[Place], tuple[int, int]]) -> tuple[Any, list[Mistake]]:
-    """Return the plain values of a scene with its robots turned into bodies, and the mistakes found.
-
-    `stands_at` gives line and column of a path such as ("robots", 0, "urdf") in the file.
-    """
-    if not (isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)):
-        return given, []
-    listed, mistakes = given.get("bodies"), []
-    bodies = list(listed) if isinstance(listed, list) else []
-    if len(given["robots"]) > MAX_ROBOTS:
-        expected = f"at most {MAX_ROBOTS} robots"
-        return given, [Mistake(file, *stands_at(("robots",)), "robots", f"{len(given['robots'])} robots", expected)]
-    for i, item in enumerate(given["robots"]):
-        try:
-            bodies += bodies_of(Robot.model_validate(item), Path(file).parent)
-        except ValidationError as failure:
-            for error in failure.errors(include_url=False):
-                place = ("robots", i, *error["loc"])
-                mistakes.append(Mistake(file, *stands_at(place), written(place), shown(error["input"]), error["msg"]))
-        except ArgumentError as failure:
-            where, field = f"robots[{i}].{failure.argument}", failure.argument.split(" ")[0]
-            place = ("robots", i, field if field in Robot.model_fields else "urdf")
-            mistakes.append(Mistake(file, *stands_at(place), where, shown(failure.value), failure.expected))
-    kept = {key: value for key, value in given.items() if key != "robots"}
-    return kept | {"bodies": bodies if listed is None or isinstance(listed, list) else listed}, mistakes
+    return re.sub(r"[^A-Za-z0-9_-]", "_", f"{robot.name}_{link}")

@@ -11,14 +11,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
-from pydantic_core import InitErrorDetails
 
 from iapb.errors import ArgumentError, Mistake, SceneError
 from iapb.names import one_of
 from iapb.scene import find_scene, scene_folder, scene_names
-from iapb.scene.document import MAX_CHARACTERS
-from iapb.scene.parts import Name, Number, Part, Text, located, mistakes_of
-from iapb.scene.reading import read_values
+from iapb.scene.document import MAX_CHARACTERS, Document
+from iapb.scene.parts import Name, Number, Part, Text, mistakes_of
+from iapb.scene.parts import Path as FieldPath
 from reports.store.keys import hash_of
 
 LAW = "law."  # paths below it are settings of the contact law
@@ -38,12 +37,11 @@ class Range(Part):
     scale: Literal["linear", "log"] = Field("linear", description="equal steps, or equal factors")
 
     @classmethod
-    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
+    def across_fields(cls, given: Any) -> Iterator[tuple[FieldPath, Any, str]]:
         ends = [given.get(name) for name in ("from", "to")] if isinstance(given, dict) else []
         positive = all(isinstance(end, int | float) and end > 0.0 for end in ends)
         if ends and given.get("scale") == "log" and not positive:
-            return [located(("scale",), "log", "linear where an end is not positive")]
-        return []
+            yield ("scale",), "log", "linear where an end is not positive"
 
     def values(self) -> tuple[float, ...]:
         """Return the values; the first and the last are exact."""
@@ -67,11 +65,10 @@ class Span(Part):
     stop: Number = Field(alias="to", description="largest value")
 
     @classmethod
-    def across_fields(cls, given: Any) -> list[InitErrorDetails]:
+    def across_fields(cls, given: Any) -> Iterator[tuple[FieldPath, Any, str]]:
         start, stop = (given.get(name) for name in ("from", "to")) if isinstance(given, dict) else (None, None)
         if isinstance(start, int | float) and isinstance(stop, int | float) and start > stop:
-            return [located(("to",), stop, f"at least {start}, where it starts")]
-        return []
+            yield ("to",), stop, f"at least {start}, where it starts"
 
 
 class Draws(Part):
@@ -129,11 +126,12 @@ def load_study(path: str | Path) -> Study:
 
 def study_from_text(text: str, file: str = "(text)") -> Study:
     """Read a study from YAML text; see `load_study`."""
-    root, mistakes = read_values(text, file, "study")
+    document = Document(text, file, "study")
+    mistakes = document.mistakes
     try:
-        study = Study.model_validate(root.value)
+        study = Study.model_validate(document.value)
     except ValidationError as failure:
-        raise SceneError(mistakes + mistakes_of(failure, file, root.value, root.stands_at), "study") from failure
+        raise SceneError(mistakes + mistakes_of(failure, file, document.value, document.place), "study") from failure
     if study.size > MAX_POINTS:
         mistakes.append(Mistake(file, 1, 1, "(file)", f"{study.size} points", f"at most {MAX_POINTS}"))
     if mistakes:

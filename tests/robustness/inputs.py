@@ -28,7 +28,7 @@ from iapb.errors import IapbError, RunFileError
 from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.recording import Recorder
 from iapb.scene import Scene, find_scene, scene_folder
-from iapb.scene.document import read_document
+from iapb.scene.document import Document
 from iapb.simulation import Simulation
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import read_problem
@@ -87,7 +87,7 @@ def _scene_or_text(sample: bytes, other: bytes, rng: Rng) -> bytes:
 
 @cache
 def _plain(sample: bytes) -> Any:
-    return read_document(sample.decode())[0].value
+    return Document(sample.decode()).value
 
 
 def _only_bytes(sample: bytes, other: bytes, rng: Rng) -> bytes:

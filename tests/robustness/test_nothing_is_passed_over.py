@@ -15,7 +15,7 @@ import pytest
 from iapb.errors import ArgumentError, IapbError, SceneError
 from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.scene import load_scene, scene_folder
-from iapb.scene.document import read_document
+from iapb.scene.document import Document
 from reference.datasets import DatasetError, read_problem
 from reports.sweeps.study import find_study, scene_of, study_from_text
 
@@ -37,7 +37,7 @@ def renamed(plain: Any) -> Iterator[tuple[str, Any]]:
 
 @pytest.mark.parametrize("path", SCENES[:: max(1, len(SCENES) // 4)], ids=lambda path: path.stem)
 def test_no_field_of_a_scene_can_be_misspelt(path: Path, tmp_path: Path) -> None:
-    plain = read_document(path.read_text())[0].value
+    plain = Document(path.read_text()).value
     shutil.copytree(scene_folder() / "robots", tmp_path / "robots")
     for field, damaged in list(renamed(plain))[::4]:
         (tmp_path / "scene.yaml").write_text(json.dumps(damaged))

@@ -16,7 +16,7 @@ from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.scene.mechanism import largest_friction, mechanism_of, pairs_of, restitutions_of, shapes_of
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
 from reference.complementarity.problem import ImpactProblem
 from reference.contact_rows import unit_tangents
 from reference.worlds import run_world
@@ -49,7 +49,7 @@ def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
     """
     mechanism, approach = mechanism_of(scene), scene.contact.approach_velocity
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
-    rubbing = bool(run.law_settings.get("friction_in_impacts")) and largest_friction(scene) > 0.0
+    rubbing = bool(run.law_settings.get("friction_in_impacts")) and scene.largest_friction > 0.0
     other_law = scene.contact.self_collision_rows == "per_body" or len(values) != 1 or rubbing
     cases, left_out = [], 0
     for blow in _group_impacts(run, mechanism):

@@ -18,7 +18,6 @@ from iapb.contact.laws import ENGINE_LAWS
 from iapb.errors import ArgumentError
 from iapb.run import Run
 from iapb.scene import scene_from_text
-from iapb.scene.mechanism import largest_friction
 from iapb.system import System
 from reference.exact import bulk_energy_gain, relative_energy_gain
 from verification.laws.bounds import FACTORED, LawResidual
@@ -304,7 +303,7 @@ def friction_stays_in_its_cone(trajectory: Trajectory) -> LawResidual | None:
     if not trajectory.by_the_engine or not len(contacts.gap):
         return None
     constants = run.scene_resolved["contact"]
-    most = largest_friction(trajectory.system.scene) * np.maximum(contacts.normal_force, 0.0)
+    most = trajectory.system.scene.largest_friction * np.maximum(contacts.normal_force, 0.0)
     length = np.linalg.norm(contacts.friction_force, axis=1)
     along = np.abs(np.einsum("ni,ni->n", contacts.friction_force, contacts.normal))
     excess = np.maximum(length - most, along)

@@ -29,7 +29,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.scene.mechanism import largest_friction, mechanism_of
+from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import INTERRUPTED
 from reference.worlds import WORLDS, run_world
 from verification.finding import (
@@ -69,7 +69,7 @@ class WorldRun:
 
 def default_worlds(scene: Scene) -> tuple[str, ...]:
     """Return the default worlds of a scene: those with friction only if it has friction, CBuc only if it has gains."""
-    rough = largest_friction(scene) > 0.0
+    rough = scene.largest_friction > 0.0
     coupled = scene.hand is not None and scene.couplings.unilateral is not None
     return ("IAPB", "PB", *(["IAPB-friction"] if rough else []), "ideal", *(["ideal-friction"] if rough else []),
             *(["CBuc"] if coupled else []))  # fmt: skip
@@ -135,7 +135,7 @@ def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> 
         worlds = worlds.split(",")
     names = tuple(dict.fromkeys(name.strip() for name in worlds)) if worlds else default_worlds(scene)
     if against is None:
-        wanted = "ideal-friction" if largest_friction(scene) > 0.0 else "ideal"
+        wanted = "ideal-friction" if scene.largest_friction > 0.0 else "ideal"
         against = wanted if worlds is None or wanted in names else "ideal" if "ideal" in names else wanted
     for argument, name in [*(("worlds", name) for name in names), ("against", against)]:
         if name not in WORLDS:

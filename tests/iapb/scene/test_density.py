@@ -9,7 +9,6 @@ import pytest
 
 from iapb.errors import SceneError
 from iapb.scene import scene_from_text
-from iapb.scene.density import _cos_sin
 
 PLANE = "name: d\nrate: 1000\nduration: 1\nbodies:\n  - {name: b, joint: planar, %s}\n"
 SPACE = "name: d\nrate: 1000\nduration: 1\ndimensions: 3\nbodies:\n  - {name: b, joint: free_flyer, %s}\n"
@@ -44,12 +43,6 @@ def test_spatial_shapes() -> None:
     assert np.allclose(np.linalg.eigvalsh(turned.inertia), [2.5, 5.0, 6.5])
 
 
-def test_a_turn_is_that_of_the_engine() -> None:
-    for angle in (0.0, 0.1, -2.0, 3.14159, 100.0):
-        assert _cos_sin(angle) == pytest.approx((math.cos(angle), math.sin(angle)), abs=1e-14)
-    assert _cos_sin(0.0) == (1.0, 0.0)
-
-
 def test_a_density_can_be_swept_and_what_it_gives_is_what_a_scene_holds() -> None:
     scene = scene_from_text(PLANE % f"density: 10, shapes: [{BOX}]")
     assert scene.bodies[0].density is None and "density: null" in scene.with_values({}).source_text
@@ -58,7 +51,7 @@ def test_a_density_can_be_swept_and_what_it_gives_is_what_a_scene_holds() -> Non
 
 
 @pytest.mark.parametrize(("text", "said"), [
-    (f"density: 10, mass: 2, shapes: [{BOX}]", "5: bodies[0].density = 10: expected no density beside mass"),
+    (f"density: 10, mass: 2, shapes: [{BOX}]", "5: bodies[0].density = 10: expected shapes that it fills, and no mass"),
     ("density: 10", "5: bodies[0].density = 10: expected shapes that it fills"),
     (f"density: -1, shapes: [{BOX}]", "5: bodies[0].density = -1: expected a number >= 1e-12"),
     (f"density: x, shapes: [{BOX}]", "5: bodies[0].density = 'x': expected a number"),

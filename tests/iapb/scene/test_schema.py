@@ -10,15 +10,14 @@ from typing import Any
 import pytest
 
 from iapb.scene import find_scene, scene_names, scene_schema
-from iapb.scene.document import read_document
+from iapb.scene.document import Document
 
 SCHEMA = scene_schema()
 
 
 def plain(name: str) -> Any:
     """The values of a scene file as they are written."""
-    root, _ = read_document(find_scene(name).read_text("utf-8"))
-    return root.value
+    return Document(find_scene(name).read_text("utf-8")).value
 
 
 @pytest.mark.parametrize("name", scene_names())
