@@ -123,7 +123,7 @@ class WholeCompiler(_Compiler):
     lowering = WholeLowering
 
 
-def compile_as_whole(function: Any, is_absent: Any, otherwise: Any, **options: Any) -> Any:
+def compile_as_whole(function: Any, is_absent: Any = lambda kinds: False, otherwise: Any = None, **options: Any) -> Any:
     """Compile a function as numba's `njit` does, with one version for Python and one for kernels that call it.
 
     For argument types with is_absent(types), kernels get a third version, which returns the constant `otherwise`.
@@ -151,6 +151,6 @@ def compile_as_whole(function: Any, is_absent: Any, otherwise: Any, **options: A
         plain = tuple(types.unliteral(kind) for kind in arguments)
         return version(plain).get_call_template(plain, keywords)
 
-    compiled.get_call_template = get_call_template
+    compiled.bitcode, compiled.get_call_template = inner, get_call_template
     compiled.get_overload = lambda arguments: version(arguments).get_overload(arguments)
     return compiled

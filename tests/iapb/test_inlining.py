@@ -53,11 +53,11 @@ def test_the_bitcode_is_compiled_with_the_options_of_the_kernel() -> None:
     """Asked of the options: once numba has refused to allocate, it refuses everywhere in the process."""
     compiled = compile_as_whole(_square.py_func, _nrt=False)
     assert compiled.targetoptions["_nrt"] is False
-    assert compiled.get_overload.__self__.targetoptions["_nrt"] is False
+    assert compiled.bitcode.targetoptions["_nrt"] is False
 
 
 def bitcode_versions(compiled: Any) -> int:
-    return len(compiled.get_overload.__self__.overloads)
+    return len(compiled.bitcode.overloads)
 
 
 def test_the_caller_has_all_that_it_calls_and_only_it_becomes_machine_code() -> None:
