@@ -265,9 +265,8 @@ class AnyBody(Part):
 class _PlanarJoint(Part):
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
-    joint: Literal["fixed", "revolute", "prismatic", "planar"] = Field(
-        description="how it moves: fixed; revolute [rad]; prismatic along axis [m]; planar = x, y [m], theta [rad]"
-    )
+    joint: Literal["fixed", "revolute", "prismatic", "planar"] = Field(description="how it moves: fixed; revolute "
+        "[rad]; prismatic along axis [m]; planar = x, y [m], theta [rad]")
     axis: Axis[Vector2] = None
     origin: Origin[Vector2] = (0.0, 0.0)
     angle: Number = Field(0.0, description="rotation of the joint frame in the parent [rad]")
@@ -297,10 +296,9 @@ class Body(AnyBody, _PlanarJoint):
 class _SpatialJoint(Part):
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
-    joint: Literal["fixed", "revolute", "continuous", "prismatic", "spherical", "free_flyer"] = Field(
-        description="how it moves; position: revolute [rad], continuous cos, sin, prismatic [m], spherical "
-        "quaternion x, y, z, w, free_flyer x, y, z [m] and quaternion"
-    )
+    joint: Literal["fixed", "revolute", "continuous", "prismatic", "spherical", "free_flyer"] = Field(description="how "
+        "it moves; position: revolute [rad], continuous cos, sin, prismatic [m], spherical quaternion x, y, z, w, "
+        "free_flyer x, y, z [m] and quaternion")
     axis: Axis[Vector3] = None
     origin: Origin[Vector3] = ORIGIN
     rpy: Vector3 = Field(ORIGIN, description="rotation of the joint frame in the parent: roll, pitch, yaw [rad]")
@@ -312,10 +310,8 @@ class SpatialBody(AnyBody, _SpatialJoint):
     with_axis = ("revolute", "continuous", "prismatic")
 
     center_of_mass: CenterOfMass[Vector3] = ORIGIN
-    inertia: Inertia = Field(
-        ORIGIN,
-        description="about the centre of mass, body axes [kg m2]: xx, yy, zz; or xx, yy, zz, xy, xz, yz; or a matrix",
-    )
+    inertia: Inertia = Field(ORIGIN, description="about the centre of mass, body axes [kg m2]: xx, yy, zz; or xx, yy, "
+        "zz, xy, xz, yz; or a matrix")
     shapes: Shapes[SpatialShape] = ()
 
     @field_validator("inertia")

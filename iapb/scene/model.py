@@ -18,7 +18,7 @@ from pydantic.json_schema import models_json_schema
 from iapb.errors import ArgumentError, SceneError
 from iapb.names import one_of
 from iapb.scene.across import across_parts
-from iapb.scene.bodies import INERTIAL, ORIGIN, Body, SpatialBody, SpatialWall, Wall
+from iapb.scene.bodies import INERTIAL, ORIGIN, Body, SpatialBody, SpatialWall, V, Wall
 from iapb.scene.document import Document, block_lines
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
@@ -47,6 +47,10 @@ MAX_ROWS = 100_000  # rows of a hand's force over time
 MAX_DELAY = 1000  # steps
 AUTO = ("stiffness", "damping", "coherence_distance")  # contact fields that `auto` chooses if they are not given
 PerCoordinate = tuple[NonNegative, ...]
+Gravity = Annotated[V | None, Field(description="acceleration [m/s2], world axes; default: none")]
+Bodies = Annotated[tuple[V, ...], Field(min_length=1, max_length=MAX_BODIES,
+                                        description="what can move, each after its parent")]
+Walls = Annotated[tuple[V, ...], Field(max_length=MAX_WALLS, description="the static world")]
 
 
 class FrictionPair(Part):
@@ -59,57 +63,36 @@ class FrictionPair(Part):
 class Contact(Part):
     """How contacts behave. The defaults are the paper's values; where it gives none, they are this project's."""
 
-    auto: Truth = Field(
-        False,
-        description="true: stiffness, damping and coherence_distance are chosen from masses, sizes, gravity and rate "
-        "where they are not given; contact: auto is short for it; default false",
-    )
-    resting_start: Truth = Field(
-        False,
-        description="true: what touches at the start begins where springs and friction hold it; default false",
-    )
-    forces: Literal["implicit", "paper"] = Field(
-        "implicit",
-        description="implicit (default): resting forces that no stiffness or step makes unstable, friction in impacts, "
-        "stiffness and damping chosen for a sag below 0.1 mm; paper: explicit (5) and (6), impacts without friction, "
-        "K = 1000, B = 50; contact: paper is short for it",
-    )
+    auto: Truth = Field(False, description="true: stiffness, damping and coherence_distance are chosen from masses, "
+        "sizes, gravity and rate where they are not given; contact: auto is short for it; default false")
+    resting_start: Truth = Field(False, description="true: what touches at the start begins where springs and "
+        "friction hold it; default false")
+    forces: Literal["implicit", "paper"] = Field("implicit", description="implicit (default): resting forces that no "
+        "stiffness or step makes unstable, friction in impacts, stiffness and damping chosen for a sag below 0.1 mm; "
+        "paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; contact: paper is short for it")
     stiffness: NonNegative = Field(1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen")
     damping: NonNegative = Field(50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen")
-    penalty: Literal["clamped", "printed"] = Field(
-        "clamped", description="clamped (default): never pulls; printed: (5) to the letter, may pull"
-    )
+    penalty: Literal["clamped", "printed"] = Field("clamped", description="clamped (default): never pulls; printed: "
+        "(5) to the letter, may pull")
     friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")
     friction_pairs: Annotated[tuple[FrictionPair, ...], Field(max_length=MAX_PAIRS)] = Field(
         (), description="coefficients of single pairs; they come before what bodies and walls give; default: none"
     )
-    friction_law: Literal["coulomb", "regularised"] = Field(
-        "coulomb",
-        description="coulomb (default): sticks and slides, implicit in the step; regularised: the paper's explicit (6)",
-    )
-    friction_velocity: Positive = Field(
-        1e-3,
-        description="v_threshold of (6) [m/s]: below it regularised friction grows linearly; default 1e-3, ours",
-    )
+    friction_law: Literal["coulomb", "regularised"] = Field("coulomb", description="coulomb (default): sticks and "
+        "slides, implicit in the step; regularised: the paper's explicit (6)")
+    friction_velocity: Positive = Field(1e-3, description="v_threshold of (6) [m/s]: below it regularised friction "
+        "grows linearly; default 1e-3, ours")
     restitution: Fraction = Field(0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0")
-    approach_velocity: NonNegative = Field(
-        1e-6, description="v_approach [m/s]: contacts that approach faster collide; default 1e-6, ours"
-    )
-    cluster_distance: NonNegative = Field(
-        0.0, description="contacts closer than this [m] become one; default 0 = no clustering"
-    )
-    coherence_distance: NonNegative = Field(
-        0.0,
-        description="a contact this close [m] to one of the step before is not new; must exceed the largest "
-        "speed times the step; default 0 = no such filter",
-    )
-    self_collision_rows: Literal["relative", "per_body"] = Field(
-        "relative",
-        description="rows of a collision of two moving bodies: relative (12), default; per_body (13)-(14)",
-    )
-    self_collisions: Truth = Field(
-        False, description="whether bodies of one tree, not neighbours in it, can touch; default false"
-    )
+    approach_velocity: NonNegative = Field(1e-6, description="v_approach [m/s]: contacts that approach faster "
+        "collide; default 1e-6, ours")
+    cluster_distance: NonNegative = Field(0.0, description="contacts closer than this [m] become one; default 0 = no "
+        "clustering")
+    coherence_distance: NonNegative = Field(0.0, description="a contact this close [m] to one of the step before is "
+        "not new; must exceed the largest speed times the step; default 0 = no such filter")
+    self_collision_rows: Literal["relative", "per_body"] = Field("relative", description="rows of a collision of two "
+        "moving bodies: relative (12), default; per_body (13)-(14)")
+    self_collisions: Truth = Field(False, description="whether bodies of one tree, not neighbours in it, can touch; "
+        "default false")
 
     _chosen: tuple[str, ...] = PrivateAttr(())
 
@@ -138,17 +121,13 @@ class Hand(Part):
 
     body: Name = Field(description="the body that the hand holds")
     point: Vector2 = Field((0.0, 0.0), description="where it holds it [m], body axes; default: the body's origin")
-    force: tuple[Number, Number, Number] = Field(
-        (0.0, 0.0, 0.0), description="constant force and torque [N, N, N m], world axes; default: none"
-    )
-    force_table: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MAX_ROWS)] = Field(
-        (), description="rows of time [s] and force as in force; linear in between, the first row before it and the "
-        "last one after it; default: none"
-    )
-    force_function: tuple[Expression, ...] = Field(
-        (), description="the force as functions of the time t [s], one text for each number of force, such as "
-        "0.5*sin(2*pi*t); default: none"
-    )
+    force: tuple[Number, Number, Number] = Field((0.0, 0.0, 0.0), description="constant force and torque [N, N, N m], "
+        "world axes; default: none")
+    force_table: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MAX_ROWS)] = Field((), description="rows "
+        "of time [s] and force as in force; linear in between, the first row before it and the last one after it; "
+        "default: none")
+    force_function: tuple[Expression, ...] = Field((), description="the force as functions of the time t [s], one "
+        "text for each number of force, such as 0.5*sin(2*pi*t); default: none")
 
     @field_validator("force_table", "force_function")
     @classmethod
@@ -206,8 +185,7 @@ class SpatialHand(Hand):
 
     point: Vector3 = Field(ORIGIN, description="where it holds the body [m], body axes")  # type: ignore[assignment]
     force: tuple[Number, Number, Number, Number, Number, Number] = Field(  # type: ignore[assignment]
-        (0.0,) * 6, description="constant force and torque [N, N, N, N m, N m, N m], world axes; default: none"
-    )
+        (0.0,) * 6, description="constant force and torque [N, N, N, N m, N m, N m], world axes; default: none")
 
 
 Waveform = Literal["step", "brake", "ring-rubber", "ring-wood", "ring-aluminium"]
@@ -216,21 +194,16 @@ Waveform = Literal["step", "brake", "ring-rubber", "ring-wood", "ring-aluminium"
 class Device(Part):
     """The haptic device. It has the tool's kinematics, so its lists have one number per tool coordinate."""
 
-    force_limit: tuple[Positive, ...] | None = Field(
-        None, description="largest force per coordinate [N, N m]; default: no limit"
-    )
-    delay: Annotated[int, Field(strict=True, ge=0, le=MAX_DELAY)] = Field(
-        0, description="steps between the device and the world, each way; default 0"
-    )
-    position_resolution: PerCoordinate | None = Field(
-        None, description="smallest step that its sensors see, per coordinate [m, rad]; default: exact"
-    )
-    damping: PerCoordinate | None = Field(
-        None, description="physical damping per coordinate [N s/m, N m s/rad]; default: none"
-    )
-    waveform: Waveform = Field(
-        "step", description="how an impulse reaches the hand: in one step, as a brake, or ringing; default step"
-    )
+    force_limit: tuple[Positive, ...] | None = Field(None, description="largest force per coordinate [N, N m]; "
+        "default: no limit")
+    delay: Annotated[int, Field(strict=True, ge=0, le=MAX_DELAY)] = Field(0, description="steps between the device "
+        "and the world, each way; default 0")
+    position_resolution: PerCoordinate | None = Field(None, description="smallest step that its sensors see, per "
+        "coordinate [m, rad]; default: exact")
+    damping: PerCoordinate | None = Field(None, description="physical damping per coordinate [N s/m, N m s/rad]; "
+        "default: none")
+    waveform: Waveform = Field("step", description="how an impulse reaches the hand: in one step, as a brake, or "
+        "ringing; default step")
 
 
 class Gains(Part):
@@ -259,19 +232,15 @@ class Scene(Part):
         None, description="how a step moves the bodies; default momentum, which keeps linear and angular momentum; in "
         "the plane with contact.forces: paper semi_implicit_euler"
     )
-    gravity: Vector2 | None = Field(None, description="acceleration [m/s2], world axes; default: none")
-    bodies: Annotated[tuple[Body, ...], Field(min_length=1, max_length=MAX_BODIES)] = Field(
-        description="what can move, each after its parent"
-    )
-    walls: Annotated[tuple[Wall, ...], Field(max_length=MAX_WALLS)] = Field((), description="the static world")
-    contact: Annotated[Contact, _SHORT] = Field(
-        default_factory=lambda: Contact.model_validate({}), description="how contacts behave"
-    )
+    gravity: Gravity[Vector2] = None
+    bodies: Bodies[Body]
+    walls: Walls[Wall] = ()
+    contact: Annotated[Contact, _SHORT] = Field(default_factory=lambda: Contact.model_validate({}), description="how "
+        "contacts behave")
     hand: Hand | None = Field(None, description="the hand that holds the tool; default: nobody")
     device: Device | None = Field(None, description="limits of the haptic device; default: an ideal one")
-    couplings: Couplings = Field(
-        default_factory=lambda: Couplings.model_validate({}), description="gains between device and tool"
-    )
+    couplings: Couplings = Field(default_factory=lambda: Couplings.model_validate({}), description="gains between "
+        "device and tool")
 
     _source_text: str = PrivateAttr("")
     _file: str = PrivateAttr("")  # file that the text was read from, if any
@@ -375,13 +344,9 @@ class SpatialScene(Scene):
     """A scene in space: like `Scene`, but vectors have three numbers."""
 
     dimensions: Literal[3] = Field(description="3: a scene in space; a scene without this field is planar")
-    gravity: Vector3 | None = Field(None, description="acceleration [m/s2], world axes; default: none")  # type: ignore[assignment]
-    bodies: Annotated[tuple[SpatialBody, ...], Field(min_length=1, max_length=MAX_BODIES)] = Field(  # type: ignore[assignment]
-        description="what can move, each after its parent"
-    )
-    walls: Annotated[tuple[SpatialWall, ...], Field(max_length=MAX_WALLS)] = Field(  # type: ignore[assignment]
-        (), description="the static world"
-    )
+    gravity: Gravity[Vector3] = None  # type: ignore[assignment]
+    bodies: Bodies[SpatialBody]  # type: ignore[assignment]
+    walls: Walls[SpatialWall] = ()  # type: ignore[assignment]
     hand: SpatialHand | None = Field(None, description="the hand that holds the tool; default: nobody")
 
 

@@ -43,16 +43,12 @@ class Robot(Part):
     floating: bool = Field(
         False, strict=True, description="true: the root link moves freely; default: fixed to the world"
     )
-    collisions: Literal["none", "urdf"] = Field(
-        "none", description="urdf: boxes and spheres of the file's <collision> elements can touch, where shapes says "
-        "nothing about the link; none: shapes alone"
-    )
-    shapes: dict[str, tuple[SpatialShape, ...]] = Field(
-        default_factory=dict, description="what can touch, by link; link axes; [] for nothing"
-    )
-    position: dict[str, tuple[Number, ...]] = Field(
-        default_factory=dict, description="coordinates at the start of the joint that carries a link; default: at rest"
-    )
+    collisions: Literal["none", "urdf"] = Field("none", description="urdf: boxes and spheres of the file's "
+        "<collision> elements can touch, where shapes says nothing about the link; none: shapes alone")
+    shapes: dict[str, tuple[SpatialShape, ...]] = Field(default_factory=dict, description="what can touch, by link; "
+        "link axes; [] for nothing")
+    position: dict[str, tuple[Number, ...]] = Field(default_factory=dict, description="coordinates at the start of "
+        "the joint that carries a link; default: at rest")
     velocity: dict[str, tuple[Number, ...]] = Field(default_factory=dict, description="the same for velocities")
 
 

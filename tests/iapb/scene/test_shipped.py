@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from iapb.contact.geometry import contact_capacity, make_contact_buffer
-from iapb.contact.kernels.narrow_phase import detect
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text, scene_names
-from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
+from iapb.scene.mechanism import mechanism_of, start_of
 from iapb.simulation import simulate
+from iapb.system import System
 
 
 def contacts_at(scene: Scene, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, float]]:
     """Return point, normal and gap of every contact of a configuration."""
-    shapes = shapes_of(scene)
-    pairs = pairs_of(scene, shapes)
-    buffer = make_contact_buffer(contact_capacity(shapes, pairs))
-    rotation, position = mechanism_of(scene).placements(q)
-    count = detect(shapes, pairs, rotation, position, 0.0, buffer)
-    return [(buffer.point[i].copy(), buffer.normal[i].copy(), float(buffer.gap[i])) for i in range(count)]
+    found = System(scene).contacts_at(q)
+    return list(zip(found.point, found.normal, found.gap.tolist(), strict=True))
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -86,14 +79,6 @@ def test_table_1_stands_in_the_peg_scenes() -> None:
         assert couplings.unilateral.damping == (50.0, 50.0, 0.125)
 
 
-def test_peg_starts_8_mm_above_the_floor_and_10_mm_from_the_wall() -> None:
-    x, y, tilt = load_scene(find_scene("peg_corner")).bodies[0].position
-    reach_x = 0.0105 * math.cos(tilt) + 0.00525 * math.sin(tilt)
-    reach_y = 0.0105 * math.sin(tilt) + 0.00525 * math.cos(tilt)
-    assert x - reach_x == pytest.approx(0.010, abs=1e-4)
-    assert -y - reach_y == pytest.approx(0.008, abs=1e-4)
-
-
 @pytest.mark.parametrize("depth", [1e-6, 1e-5, 7e-5])
 def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float) -> None:
     """Six contacts approach at once wherever in the step the peg arrives; their rows have rank 3."""
@@ -107,49 +92,6 @@ def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float
     assert rows.shape == (6, 3)
     assert (rows @ inward < -10.0 * scene.contact.approach_velocity).all()
     assert np.linalg.matrix_rank(rows, tol=1e-4) == 3
-
-
-def test_hole_with_parallel_sides_gives_no_six_approaching_contacts() -> None:
-    """Why the hole has a draft: sliding straight in approaches the end only."""
-    straight = {
-        "bodies.peg.shapes.0.vertices": [
-            [-0.00525, -0.0105],
-            [0.00525, -0.0105],
-            [0.00525, 0.0105],
-            [-0.00525, 0.0105],
-        ],
-        "walls.left_side.vertices": [[0.00525, -0.005], [0.02, -0.005], [0.02, 0.03], [0.00525, 0.03]],
-        "walls.right_side.vertices": [[-0.00525, -0.005], [-0.02, -0.005], [-0.02, 0.03], [-0.00525, 0.03]],
-    }
-    scene = load_scene(find_scene("peg_hole")).with_values(straight)
-    mechanism, q = mechanism_of(scene), np.array([0.0, 0.01049, 0.0])
-    found = contacts_at(scene, q)
-    rows = np.array([normal @ mechanism.point_jacobian(q, 0, point) for point, normal, _ in found])
-    assert (rows @ [0.0, -0.04, 0.0] < -scene.contact.approach_velocity).sum() == 2
-
-
-def test_one_dimensional_wall_is_one_contact() -> None:
-    scene = load_scene(find_scene("wall_1d"))
-    assert mechanism_of(scene).nv == 1
-    assert len(contacts_at(scene, np.array([-0.009]))) == 1
-
-
-def test_fingertip_block_and_wall_form_one_chain_of_contacts() -> None:
-    scene = load_scene(find_scene("arm_pushing"))
-    q, _ = start_of(scene)
-    assert not contacts_at(scene, q)
-    mechanism = mechanism_of(scene)
-    rotation, position = mechanism.placements(q)
-    tip = position[1] + rotation[1] @ [0.3, 0.0, 0.0]
-    overlap = 1e-5
-    block = tip[0] + 0.02 + 0.05 - overlap
-    pressed = scene.with_values(
-        {"bodies.block.position.0": block, "walls.wall.point": [block + 0.05 - overlap, 0.0]}
-    )
-    found = contacts_at(pressed, start_of(pressed)[0])
-    assert len(found) == 3  # the fingertip, and two corners of the block at the wall
-    rows = np.array([gap for _, _, gap in found])
-    np.testing.assert_allclose(rows, -overlap, rtol=1e-6)
 
 
 @pytest.fixture(scope="module")
