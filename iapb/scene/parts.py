@@ -20,16 +20,10 @@ Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, **_FINITE
 Positive = Annotated[float, Field(ge=SMALLEST_POSITIVE, le=LARGEST_NUMBER, **_FINITE)]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST_NUMBER, **_FINITE)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0, **_FINITE)]
-OwnRestitution = Annotated[
-    Fraction | None,
-    Field(
-        description="its own e of (10) [1]; of two that touch the smaller counts; default: the other's, or contact's"
-    ),
-]
-OwnFriction = Annotated[
-    NonNegative | None,
-    Field(description="its own mu [1]; of two that touch the geometric mean; default: the other's, or contact's"),
-]
+OwnRestitution = Annotated[Fraction | None, Field(
+    description="its own e of (10) [1]; of two that touch the smaller counts; default: the other's, or contact's")]
+OwnFriction = Annotated[NonNegative | None, Field(
+    description="its own mu [1]; of two that touch the geometric mean; default: the other's, or contact's")]
 Vector2 = tuple[Number, Number]
 Vector3 = tuple[Number, Number, Number]
 Truth = Annotated[bool, Field(strict=True)]
@@ -114,9 +108,7 @@ _EXPECTED = {
     "tuple_type": "a list",
     "too_short": "at least {min_length} items",
     "too_long": "at most {max_length} items",
-    "model_type": "a mapping of fields",
-    "model_attributes_type": "a mapping of fields",
-    "dict_type": "a mapping of fields",
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "a mapping of fields"),
     "union_tag_not_found": "this field: which shape it is",
     "union_tag_invalid": "one of {expected_tags}",
 }

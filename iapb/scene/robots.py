@@ -27,7 +27,7 @@ from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
 from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
 from iapb.scene.document import Document
-from iapb.scene.parts import Name, Number, Part, Text, Vector3, mistakes_of
+from iapb.scene.parts import Name, Number, Part, Text, Truth, Vector3, mistakes_of
 
 HELD = ("box", "sphere")  # URDF geometries that the compiled narrow phase supports
 MAX_ROBOTS = 100  # in one scene; each one is a file to read
@@ -40,9 +40,7 @@ class Robot(Part):
     urdf: Text = Field(description="path of the URDF file, relative to the scene file, inside its folder")
     origin: Vector3 = Field(ORIGIN, description="where its root link lies [m], world axes")
     rpy: Vector3 = Field(ORIGIN, description="how its root link is turned: roll, pitch, yaw [rad]")
-    floating: bool = Field(
-        False, strict=True, description="true: the root link moves freely; default: fixed to the world"
-    )
+    floating: Truth = Field(False, description="true: the root link moves freely; default: fixed to the world")
     collisions: Literal["none", "urdf"] = Field("none", description="urdf: boxes and spheres of the file's "
         "<collision> elements can touch, where shapes says nothing about the link; none: shapes alone")
     shapes: dict[str, tuple[SpatialShape, ...]] = Field(default_factory=dict, description="what can touch, by link; "
