@@ -1,0 +1,292 @@
+"""Contacts of shapes against the paper in numpy and against coal; bits that units, order and place must not change."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.scene import Scene
+from iapb.simulation import simulate
+from iapb.system import System
+from tests.iapb.contact.paper import contacts_between, scene_of, solids
+
+SPACES = pytest.mark.parametrize("space", [False, True])
+Values = dict[str, Any]
+
+
+def random_shape(rng: np.random.Generator, space: bool, kind: str) -> Values:
+    """A shape off its body's origin."""
+    n = 3 if space else 2
+    shape: Values = {"kind": kind, "center": rng.uniform(-0.2, 0.2, n).tolist()}
+    if kind in ("circle", "sphere"):
+        return shape | {"radius": float(rng.uniform(0.1, 0.4))}
+    turn = {"rpy": rng.normal(size=3).tolist()} if space else {"angle": float(rng.normal())}
+    if kind == "box":
+        return shape | turn | {"size": rng.uniform(0.3, 0.9, n).tolist()}
+    count = int(rng.integers(3, 7))
+    angles = 2.0 * np.pi * (np.arange(count) + rng.uniform(0.0, 0.7, count)) / count
+    reach = rng.uniform(0.2, 0.6, 2)
+    return shape | turn | {"vertices": (reach * np.column_stack([np.cos(angles), np.sin(angles)])).tolist()}
+
+
+def crowd(space: bool, seed: int, scale: float = 1.0) -> Scene:
+    """Six bodies, one of them with two shapes; a plane, and a static shape of each kind."""
+    rng, kinds = np.random.default_rng(seed), ("sphere", "box") if space else ("circle", "box", "polygon")
+    free = {"joint": "free_flyer", "inertia": [1, 1, 1]} if space else {"joint": "planar", "inertia": 1}
+    shapes = [[random_shape(rng, space, kinds[k % len(kinds)])] for k in range(6)]
+    shapes[2].append(random_shape(rng, space, kinds[1]))
+    normal = rng.normal(size=3 if space else 2)
+    walls = [{"kind": "half_space" if space else "half_plane", "point": rng.uniform(-0.5, 0.5, len(normal)).tolist(),
+              "normal": normal.tolist()}, *(random_shape(rng, space, kind) for kind in kinds)]
+    for shape in [*(shape for each in shapes for shape in each), *walls]:
+        for length in {"center", "radius", "size", "vertices", "point"} & set(shape):
+            shape[length] = (scale * np.array(shape[length])).tolist()
+    return scene_of([{"name": f"b{k}", "mass": 1.0, "shapes": each} | free for k, each in enumerate(shapes)],
+                    [{"name": f"w{k}"} | wall for k, wall in enumerate(walls)])
+
+
+def thrown(system: System, seed: int, spread: float = 0.5) -> np.ndarray:
+    """A random configuration about the origin."""
+    m = system.mechanism
+    size = m.nv // 6
+    step = [spread] * (size // 2) + [1.5] * (size - size // 2) if size == 6 else [spread, spread, 3.0]
+    return m.integrate(m.neutral(), np.random.default_rng(seed).uniform(-1.0, 1.0, m.nv) * np.tile(step, 6))
+
+
+def names_of(found: Any) -> list[tuple[int, int, int]]:
+    return list(zip(found.shape_a.tolist(), found.shape_b.tolist(), found.feature.tolist(), strict=True))
+
+
+@SPACES
+@pytest.mark.parametrize("margin", [0.0, 0.2, 3.0])
+def test_contacts_of_a_crowd_are_those_of_plain_geometry(space: bool, margin: float) -> None:
+    """Every pair of kinds: number, order of the two, place, normal and gap; bodies and names of the contact."""
+    counts = set()
+    for seed in range(30):
+        scene = crowd(space, seed)
+        system = System(scene)
+        n, q = 3 if space else 2, thrown(system, seed, 0.5 + 0.5 * (margin > 1.0))
+        shapes = solids(scene, system.mechanism, q)
+        expected, found = contacts_between(shapes, margin), system.contacts_at(q, margin)
+        pairs = [name[:2] for name in names_of(found)]
+        assert sorted(set(pairs)) == sorted(expected)
+        assert len(set(names_of(found))) == len(pairs)  # each has a name of its own
+        for pair, wanted in expected.items():
+            mine = [i for i, each in enumerate(pairs) if each == pair]
+            counts.add((shapes[pair[0]].kind, shapes[pair[1]].kind, len(mine)))
+            rows = [[*found.point[i, :n], *found.normal[i, :n], found.gap[i]] for i in mine]
+            page = [[*touch.point, *touch.normal, touch.gap] for touch in wanted]
+            assert len(rows) == len(page)
+            apart = np.abs(np.array(rows)[:, None] - np.array(page)).max(axis=2)
+            assert apart.min(axis=0).max() < 1e-10 and apart.min(axis=1).max() < 1e-10, pair
+            for i in mine:
+                assert (found.body_a[i], found.body_b[i]) == (shapes[pair[0]].body, shapes[pair[1]].body)
+        assert space or not (found.point[:, 2].any() or found.normal[:, 2].any())
+    assert {number for *_, number in counts} >= ({1, 2, 3, 4, 8} if space and margin > 1.0 else {1, 2})
+
+
+@SPACES
+def test_names_last_while_bodies_move_a_little(space: bool) -> None:
+    """Else every step of what slides or rolls would be a new contact. Which four of more corners stay may tie."""
+    for seed in range(20):
+        system = System(crowd(space, seed))
+        q = thrown(system, seed)
+        moved = system.mechanism.integrate(q, np.random.default_rng(seed).normal(size=system.mechanism.nv), 1e-10)
+        before, after = (Counter(names_of(system.contacts_at(place))) for place in (q, moved))
+        many = {pair for pair, number in Counter(name[:2] for name in before).items() if number == 4}
+        assert {name for name in before if name[:2] not in many} == {name for name in after if name[:2] not in many}
+
+
+@SPACES
+@pytest.mark.parametrize("factor", [2.0**-20, 2.0**20])
+def test_the_unit_of_length_changes_no_bit(space: bool, factor: float) -> None:
+    """A power of two rounds nothing, and no length is built in."""
+    for seed in range(10):
+        plain, scaled = System(crowd(space, seed)), System(crowd(space, seed, factor))
+        q = thrown(plain, seed)
+        size = len(q) // 6
+        lengths = np.tile([1.0] * 3 + [0.0] * 4 if size == 7 else [1.0, 1.0, 0.0], 6)
+        one = plain.contacts_at(q, 0.1)
+        other = scaled.contacts_at(q * np.where(lengths, factor, 1.0), factor * 0.1)
+        assert len(one.gap) == len(other.gap) > 0
+        for name, unit in (("point", factor), ("gap", factor), ("normal", 1.0), ("feature", 1)):
+            np.testing.assert_array_equal(getattr(other, name), unit * getattr(one, name))
+
+
+# (shape of a, shape of b or wall, place of a, gap, contacts): all numbers are binary, so that the gap is exact.
+DISC, BRICK = {"kind": "circle", "radius": 0.5}, {"kind": "box", "size": [1, 1]}
+BALL, CUBE = {"kind": "sphere", "radius": 0.5}, {"kind": "box", "size": [1, 1, 1]}
+GROUND = {"kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
+FLOOR = {"kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
+EXACT: list[tuple[Values, Values, list[float], float, int]] = [
+    (DISC, GROUND, [0, 1], 0.5, 1), (BRICK, GROUND, [0, 1], 0.5, 2),
+    (DISC, DISC | {"radius": 0.25}, [-1.5, 2], 1.75, 1), (DISC, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 1),
+    (DISC | {"radius": 1}, BRICK | {"size": [2, 2]}, [4, 5], 4.0, 1),
+    (BRICK, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 2), (BRICK, BRICK | {"size": [2, 2]}, [-4.5, 5.5], 5.0, 1),
+    (BALL, FLOOR, [0, 0, 1], 0.5, 1), (CUBE | {"size": [1, 2, 0.5]}, FLOOR, [0, 0, 1], 0.75, 4),
+    (BALL, BALL | {"radius": 0.25}, [1, -2, 2], 2.25, 1), (BALL, CUBE | {"size": [2, 2, 2]}, [0.25, 0.5, -2], 0.5, 1),
+    (BALL | {"radius": 1}, CUBE | {"size": [2, 2, 2]}, [3, -4, 7], 6.0, 1),
+    (CUBE, CUBE | {"size": [2, 2, 2]}, [0.25, 2, 0.25], 0.5, 4),
+]
+
+
+def pair_of(a: Values, b: Values, swapped: bool = False) -> System:
+    """A free body with shape a, and b: a wall, or the shape of another free body, which `swapped` puts first."""
+    space = len(b.get("normal", b.get("size", [0, 0]))) == 3 or b["kind"] == "sphere"
+    free = {"joint": "free_flyer", "inertia": [1, 1, 1]} if space else {"joint": "planar", "inertia": 1}
+    bodies = [{"name": f"b{k}", "mass": 1.0, "shapes": [shape]} | free for k, shape in enumerate((a, b))]
+    if "normal" in b:
+        return System(scene_of(bodies[:1], [{"name": "wall"} | b]))
+    return System(scene_of(bodies[::-1] if swapped else bodies, []))
+
+
+def at_places(system: System, *places: list[float]) -> np.ndarray:
+    q = system.mechanism.neutral()
+    size = len(q) // len(places)
+    for k, place in enumerate(places):
+        q[k * size : k * size + len(place)] = place
+    return q
+
+
+@pytest.mark.parametrize(("a", "b", "place", "gap", "number"), EXACT)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_gap_of_the_margin_is_kept_and_the_next_number_is_not(
+    a: Values, b: Values, place: list[float], gap: float, number: int, swapped: bool
+) -> None:
+    swapped, still = swapped and "normal" not in b, [0.0] * len(place)
+    system = pair_of(a, b, swapped)
+    q = at_places(system, *((still, place) if swapped else (place,) if "normal" in b else (place, still)))
+    found = system.contacts_at(q, gap)
+    assert found.gap.tolist() == [gap] * number
+    assert len(system.contacts_at(q, np.nextafter(gap, 0.0)).gap) == 0
+
+
+@pytest.mark.parametrize("shape", [DISC, BRICK, BALL, CUBE])
+@pytest.mark.parametrize("other", [DISC, BRICK, BALL, CUBE])
+def test_shapes_on_one_centre_have_finite_unit_normals(shape: Values, other: Values) -> None:
+    if (shape in (BALL, CUBE)) != (other in (BALL, CUBE)):
+        return
+    system = pair_of(shape, other)
+    found = system.contacts_at(system.mechanism.neutral())
+    assert len(found.gap) >= 1 and np.isfinite(found.point).all() and (found.gap < 0.0).all()
+    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("tilt", [-1e-12, 0.0, 1e-12])
+@SPACES
+def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_takes(space: bool, tilt: float) -> None:
+    """Two ends of the common edge; in space the four corners of the common rectangle, which also carry the middle."""
+    small, large = ([0.2, 0.2, 0.1], [0.6, 0.4, 0.1]) if space else ([0.2, 0.1], [0.6, 0.1])
+    for top, ground in ((small, large), (large, small)):
+        system = pair_of({"kind": "box", "size": top}, {"kind": "box", "size": ground})
+        place = [0.05, 0.03, 0.0999, tilt / 2] if space else [0.05, 0.0999, tilt]
+        q = at_places(system, place, [0.0] * len(place))
+        found = system.contacts_at(q)
+        low, high = -0.05 * np.ones(2) + [0.0, -0.02], 0.15 * np.ones(2) + [0.0, -0.02]
+        expected = [[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])] if space else [[-0.05], [0.15]]
+        if top == large:  # the lower one is the small box, about the origin
+            expected = [[x, y] for x in (-0.1, 0.1) for y in (-0.1, 0.1)] if space else [[-0.1], [0.1]]
+        got = sorted(found.point[:, : len(expected[0])].round(9).tolist())
+        np.testing.assert_allclose(got, sorted(expected), atol=1e-9)
+        np.testing.assert_allclose(found.gap, -1e-4, atol=1e-9)
+        level = system.contacts_at(at_places(system, place[:-1] + [0.0], [0.0] * len(place)))
+        assert sorted(level.feature.tolist()) == sorted(found.feature.tolist())
+
+
+@SPACES
+def test_every_side_of_a_box_that_a_ball_can_touch_has_a_name_of_its_own(space: bool) -> None:
+    """8 regions around a rectangle, 26 around a cuboid; inside, those of the faces."""
+    n, half = (3, np.array([0.3, 0.2, 0.4])) if space else (2, np.array([0.3, 0.2]))
+    system = pair_of((BALL if space else DISC) | {"radius": 0.05}, {"kind": "box", "size": (2.0 * half).tolist()})
+    names: dict[int, tuple[int, ...]] = {}
+    for number in range(3**n):
+        signs = np.array([number // 3**k % 3 - 1 for k in range(n)])
+        for depth in (0.15, -0.02) if np.count_nonzero(signs) == 1 else (0.15,) if signs.any() else ():
+            place = np.where(signs != 0, signs * (half + depth), 0.1 * half)
+            found = system.contacts_at(at_places(system, place.tolist(), [0.0] * n), 1.0)
+            assert names.setdefault(int(found.feature[0]), tuple(signs)) == tuple(signs)
+    assert len(names) == 3**n - 1
+
+
+def test_faces_of_two_cubes_never_share_a_name() -> None:
+    """Six faces of the one against six of the other, each box as the one that clips: no name occurs twice."""
+    owners: dict[int, tuple[Any, ...]] = {}
+    turns = [np.zeros(3), *([np.pi / 2 * s * np.eye(3)[k] for k in range(3) for s in (1, -1)]), np.array([np.pi, 0, 0])]
+    for sizes in ([1.0, 0.8], [0.8, 1.0]):
+        system = pair_of(*({"kind": "box", "size": [size] * 3} for size in sizes))
+        for axis, side, turn in ((k, s, turn) for k in range(3) for s in (1.0, -1.0) for turn in turns):
+            q = system.mechanism.integrate(system.mechanism.neutral(), np.concatenate([np.zeros(9), turn]))
+            q[:3] = side * 0.899 * np.eye(3)[axis]
+            facing = system.mechanism.placements(q)[0][1].T @ (side * np.eye(3)[axis])
+            found, owner = system.contacts_at(q), (sizes[0], axis, side, *facing.round(6).tolist())
+            assert len(found.gap) == 4
+            for feature in found.feature.tolist():
+                assert owners.setdefault(feature, owner)[1:] == owner[1:]
+
+
+# --- other code, and the whole of a run ------------------------------------------------------------------------------
+
+
+def coal_of(coal: Any, shape: Values) -> Any:
+    return coal.Sphere(shape["radius"]) if shape["kind"] == "sphere" else coal.Box(*shape["size"])
+
+
+@pytest.mark.parametrize("kinds", [("sphere", "sphere"), ("sphere", "box"), ("box", "sphere"), ("box", "box")])
+def test_depths_agree_with_coal_at_random_poses(kinds: tuple[str, str]) -> None:
+    """Of two boxes a face may be taken that is a twentieth deeper than the edges; coal iterates to about 1e-6."""
+    coal = pytest.importorskip("coal")
+    rng, touching = np.random.default_rng(1), 0
+    for seed in range(150):
+        shapes = [random_shape(rng, True, kind) | {"center": [0, 0, 0]} for kind in kinds]
+        for shape in shapes:
+            shape.pop("rpy", None)
+        system = pair_of(*shapes)
+        m = system.mechanism
+        q = m.integrate(m.neutral(), np.random.default_rng(seed).normal(size=12) * np.tile([0.25] * 3 + [1.5] * 3, 2))
+        R, p = m.placements(q)
+        result = coal.CollisionResult()
+        a, b = (coal_of(coal, shape) for shape in shapes)
+        coal.collide(a, coal.Transform3s(R[0], p[0]), b, coal.Transform3s(R[1], p[1]), coal.CollisionRequest(), result)
+        found = system.contacts_at(q)
+        true = result.getContact(0).penetration_depth if result.isCollision() else 0.0
+        if abs(true) < 1e-5:
+            continue
+        touching += 1
+        deepest = int(np.argmin(found.gap))
+        assert abs(true) - 2e-6 <= -found.gap[deepest] <= abs(true) * 1.12 + 2e-6
+        if -found.gap[deepest] < abs(true) + 1e-8:
+            np.testing.assert_allclose(found.normal[deepest], -np.array(result.getContact(0).normal), atol=1e-3)
+    assert touching > 50
+
+
+def test_many_shapes_are_found_without_asking_all_pairs() -> None:
+    """Forty discs and a wall, in a grid that flies apart: a run finds what all pairs together give, in their order."""
+    rng = np.random.default_rng(0)
+    bodies = [{"name": f"d{k}", "joint": "planar", "mass": 0.1, "inertia": 2e-5,
+               "shapes": [{"kind": "circle", "radius": 0.02, "center": [0.01, 0.0]}],
+               "position": [0.045 * (k % 7), 0.045 * (k // 7), float(rng.normal())],
+               "velocity": rng.normal(size=3).tolist()} for k in range(40)]
+    scene = scene_of(bodies, [{"name": "wall", "kind": "half_plane", "point": [0, -0.03], "normal": [0, 1]}],
+                     contact={"forces": "paper", "stiffness": 500, "restitution": 0.5})
+    run, system, found = simulate(scene), System(scene), 0
+    for k in range(run.steps):
+        rows, every = slice(*run.contacts.offsets[k : k + 2]), system.contacts_at(run.q[k])
+        found += len(every.gap)
+        for name in ("body_a", "body_b", "gap", "point", "normal"):
+            np.testing.assert_array_equal(getattr(run.contacts, name)[rows], getattr(every, name))
+    assert found > 200
+
+
+def test_bodies_that_have_left_the_range_of_cells_are_found_too() -> None:
+    """In space, a pair of touching balls far beyond what a grid numbers, among many that rest."""
+    bodies = [{"name": f"b{k}", "joint": "free_flyer", "mass": 1.0, "inertia": [1, 1, 1],
+               "shapes": [{"kind": "sphere", "radius": 0.25}], "position": [1.0 * k, 0, 0, 0, 0, 0, 1]}
+              for k in range(20)]
+    for k, x in ((18, 8e8), (19, 8e8 + 0.25)):
+        bodies[k]["position"] = [x, -8e8, 8e8, 0, 0, 0, 1]
+    run = simulate(scene_of(bodies, []), steps=1)
+    assert list(zip(run.contacts.body_a, run.contacts.body_b, strict=True)) == [(18, 19)]
+

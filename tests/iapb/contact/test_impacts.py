@@ -1,0 +1,544 @@
+"""Impacts of (19)-(21), Poisson's law and Coulomb's: the project's own kit, exact rationals, and numbers of the paper.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iapb import resolve_frictional_impact, resolve_impact, resolve_impacts
+from reference.exact import exact_impact, relative_energy_gain
+from tests.iapb.contact.paper import Floats, breach_of_coulomb, impact, poisson
+from verification import check_passivity
+
+EPS = 2.0**-52
+Arrays = tuple[Floats, Floats, Floats]
+
+
+# --- laws, by the kit ------------------------------------------------------------------------------------------------
+
+
+def one_of_three(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """The middle one of many impacts."""
+    return resolve_impacts([2.0 * M, M, M], [J, J, -J], [v, v, 3.0 * v], [1.0, e, 0.0]).velocity[1]
+
+
+# `resolve_frictional_impact` takes every row as an equality, so contacts may pull; those carry no friction.
+EQUALITIES = ["kinetic_energy", "impulse_range", "no_penetration", "restitution", "sticking", "friction_opposes",
+              "momentum", "repeatability", "arguments"]
+SUITE: dict[str, tuple[Any, dict[str, Any]]] = {
+    "one": (resolve_impact, {"unequal_restitution": True}),
+    "one, hard": (resolve_impact, {"largest_condition": 1e10, "seed": 1}),
+    "one, in real arithmetic": (resolve_impact, {"laws": ["exact_energy"]}),
+    "many": (one_of_three, {}),
+    "many, in real arithmetic": (one_of_three, {"laws": ["exact_energy"]}),
+    "two rows at most": (partial(resolve_impact, budget=2), {"laws": ["kinetic_energy", "exact_energy"]}),
+    "pushing": (partial(resolve_impact, method="poisson"), {"contract": "unilateral"}),
+    "pushing, in real arithmetic": (partial(resolve_impact, method="poisson"),
+                                    {"contract": "unilateral", "laws": ["exact_energy"]}),
+    "friction": (resolve_frictional_impact, {"contract": "frictional", "laws": EQUALITIES}),
+    "friction, in real arithmetic": (resolve_frictional_impact, {"contract": "frictional", "laws": ["exact_energy"]}),
+}
+
+
+@pytest.mark.parametrize("name", SUITE)
+def test_the_kit_finds_no_law_broken(name: str) -> None:
+    resolver, options = SUITE[name]
+    check_passivity(resolver, impacts=150, search=0, **options).raise_if_broken()
+
+
+# --- one impact against exact rationals ------------------------------------------------------------------------------
+
+
+def problem(seed: int, d: int = 4, c: int = 3, decades: float = 0.3) -> Arrays:
+    """M, J, v; coordinates, rows and speeds differ in size by up to the given number of decades."""
+    rng = np.random.default_rng(seed)
+    root, units = rng.normal(size=(d, d)), 10.0 ** rng.uniform(-decades, decades, d)
+    mass = (root @ root.T + np.eye(d)) * units[:, None] * units
+    rows = rng.normal(size=(c, d)) * units * 10.0 ** rng.uniform(-decades, decades, (c, 1))
+    return 0.5 * (mass + mass.T), rows, rng.normal(size=d) / units * 10.0 ** rng.uniform(-decades, decades)
+
+
+def exact_change(M: Floats, v: Floats, w: Floats) -> Fraction:
+    """½ (wᵀMw − vᵀMv) in rationals, for M as given."""
+    a, b = ([Fraction(float(x)) for x in vector] for vector in (v, w))
+    return sum((Fraction(float(m)) * (b[i] * b[j] - a[i] * a[j]) for (i, j), m in np.ndenumerate(M)), Fraction(0)) / 2
+
+
+@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("clamp", [True, False])
+@pytest.mark.parametrize("decades", [0.3, 4.0, 40.0])
+def test_an_impact_is_the_exact_one_in_every_unit(seed: int, clamp: bool, decades: float) -> None:
+    """v⁺ of (21), M(v⁺ − v) = P = Jᵀp, p of least norm; the interval encloses the exact change of energy, tightly."""
+    M, J, v = problem(seed, decades=decades)
+    if decades < 1.0:  # dependent to the last bit of these rows only; in rationals of rank five at most
+        J = np.vstack((J, 2.0 * J[2], J[1], 0.0 * J[0]))
+    e = (0.0, 0.25, -0.5)[seed % 3]
+    M = M + np.triu(M * EPS, 1) * (seed % 2)  # a skew part in the last bit belongs to M
+    found = resolve_impact(M, J, v, e, clamp=clamp)
+    truth = exact_impact(0.5 * (M + M.T), J, v, e)
+    scale = np.sqrt(np.diag(M))
+    size = np.linalg.norm(scale * v)
+    np.testing.assert_allclose(scale * (found.velocity - truth.rounded_velocity), 0.0, atol=1e-10 * size)
+    momentum = np.array([float(x) for x in truth.generalized_impulse])
+    np.testing.assert_allclose(found.generalized_impulse / scale, momentum / scale, atol=1e-10 * size)
+    np.testing.assert_allclose(J.T @ found.impulses / scale, momentum / scale, atol=1e-10 * size)
+    if decades < 1.0:
+        least = np.linalg.pinv(J.T, rcond=1e-10) @ momentum
+        np.testing.assert_allclose(found.impulses, least, atol=1e-9 * np.abs(least).max())
+    assert (found.rank, found.status) == (3, "complete") and found.clamp == pytest.approx(1.0, abs=1e-13)
+    change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
+    assert Fraction(low) <= change <= Fraction(high) and low <= found.energy_change <= high
+    assert abs(Fraction(found.energy_change) - change) <= Fraction(0.51 * math.ulp(found.energy_change))
+    assert high <= 0.0 or not clamp
+    energy = float(v @ M @ v)
+    assert high - low <= 5.0 * math.ulp(found.energy_change) + 1e-28 * energy * 10.0 ** min(decades, 3.0)
+
+
+@pytest.mark.parametrize("power", [-535, -525, -400, 0, 300, 500, 511])
+@pytest.mark.parametrize("skew", [0.0, EPS])
+def test_energy_is_enclosed_where_its_squares_leave_the_range(power: int, skew: float) -> None:
+    """Elastic and back: all but rounding cancels. Of entries asymmetric in the last bit both count."""
+    for seed in range(40):
+        M, J, v = problem(seed, d=3, c=2)
+        M = M + np.triu(np.abs(M) * skew, 1)
+        v = np.ldexp(v / np.abs(v).max() / 16.0, power)
+        for e, clamp in ((1.0, False), (1.0, True), (0.3, True)):
+            found = resolve_impact(M, J, v, e, clamp=clamp)
+            change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
+            assert Fraction(low) <= change <= Fraction(high)
+            assert change <= 0 or not clamp
+            if e == 1.0 and power in (0, 300):  # as narrow as double-double sums of these products
+                assert high - low <= 2.0**-90 * float(np.abs(v) @ np.abs(M) @ np.abs(v))
+
+
+@given(seed=st.integers(0, 10_000), powers=st.lists(st.integers(-60, 60), min_size=6, max_size=6),
+       speed=st.integers(-200, 200), mass=st.integers(-100, 100), clamp=st.booleans())
+def test_units_by_powers_of_two_change_no_bit(seed: int, powers: list[int], speed: int, mass: int, clamp: bool) -> None:
+    """q' = 2^−s q, rows times 2^r, time and mass in other units: results differ by their units alone."""
+    M, J, v = problem(seed, d=5, c=4)
+    J, s, r = np.vstack((J, J[0] + J[1], 0.0 * J[0])), np.array(powers[:5]), powers[5]
+    plain = resolve_impact(M, J, v, 0.4, clamp=clamp)
+    other = resolve_impact(np.ldexp(M, s[:, None] + s + 2 * mass), np.ldexp(J, s + r), np.ldexp(v, speed - s), 0.4,
+                           clamp=clamp)
+    assert np.array_equal(other.velocity, np.ldexp(plain.velocity, speed - s))
+    assert np.array_equal(other.generalized_impulse, np.ldexp(plain.generalized_impulse, s + speed + 2 * mass))
+    assert np.array_equal(other.impulses, np.ldexp(plain.impulses, speed + 2 * mass - r))
+    assert other.energy_change == math.ldexp(plain.energy_change, 2 * (speed + mass))
+    assert (other.rank, other.status, other.clamp) == (plain.rank, plain.status, plain.clamp)
+    each = np.array(powers)  # rows of unlike units too, but for the p of least norm
+    mixed = resolve_impact(M, np.ldexp(J, each[:, None]), v, 0.4, clamp=clamp)
+    assert np.array_equal(mixed.velocity, plain.velocity)
+    assert np.array_equal(mixed.generalized_impulse, plain.generalized_impulse)
+
+
+@given(exponents=st.tuples(*[st.integers(-1000, 1000)] * 3), seed=st.integers(0, 1000),
+       e=st.sampled_from([-1.0, 0.0, 0.5, 1.0]))
+def test_results_are_finite_or_a_named_error(exponents: tuple[int, int, int], seed: int, e: float) -> None:
+    with np.errstate(over="ignore"):
+        arrays = [np.ldexp(x, k) for x, k in zip(problem(seed, 3, 4), exponents, strict=True)]
+    if not all(np.isfinite(x).all() for x in arrays):
+        return
+    try:
+        found = resolve_impact(*arrays, e)
+    except OverflowError:
+        return
+    for value in (found.velocity, found.generalized_impulse, found.impulses, found.energy_change):
+        assert np.isfinite(value).all()
+
+
+def test_subnormal_speeds_have_the_nearest_result_that_exists() -> None:
+    assert resolve_impact([[3.0]], [[1.0]], [-5e-324], 1.0).velocity[0] == 5e-324
+    assert resolve_impact([[3.0]], [[1.0]], [-5e-324], 0.0).velocity[0] == 0.0
+
+
+def test_of_a_mass_matrix_with_rounding_in_it_the_symmetric_part_counts() -> None:
+    M, J, v = problem(3)
+    skew = 1e-11 * np.triu(M, 1)
+    given, symmetric, plain = (resolve_impact(each, J, v, 0.4).velocity for each in (
+        M + skew, M + 0.5 * (skew + skew.T), M))
+    np.testing.assert_allclose(given, symmetric, rtol=1e-14, atol=1e-14)
+    assert not np.allclose(given, plain, rtol=1e-14, atol=1e-14)
+
+
+@given(seed=st.integers(0, 10_000), d=st.integers(1, 6), c=st.integers(0, 8), clamp=st.booleans(),
+       budget=st.none() | st.integers(0, 6), tolerance=st.sampled_from([None, 1e-6]))
+def test_many_at_once_are_those_one_by_one_bit_for_bit(
+    seed: int, d: int, c: int, clamp: bool, budget: int | None, tolerance: float | None
+) -> None:
+    rng, options = np.random.default_rng(seed), {"clamp": clamp, "budget": budget, "rank_tolerance": tolerance}
+    root = rng.normal(size=(5, d, d))
+    masses = root @ root.transpose(0, 2, 1) + 10.0 ** rng.uniform(-9, 0) * np.eye(d)
+    rows = rng.normal(size=(5, c, d)) * 10.0 ** rng.uniform(-6, 6, (5, c, 1))
+    rows[:, 2:4] = rows[:, 1:2]
+    v, e = rng.normal(size=(5, d)) * 10.0 ** rng.uniform(-300, 9, (5, 1)), rng.uniform(-1.0, 1.0, 5)
+    found: Any = resolve_impacts(masses, rows, v, e, **options)  # type: ignore[arg-type]
+    for k in range(5):
+        single = resolve_impact(masses[k], rows[k], v[k], e[k], **options)  # type: ignore[arg-type]
+        for name in ("velocity", "generalized_impulse", "impulses", "energy_interval", "rank", "energy_change", "clamp",
+                     "status"):
+            np.testing.assert_array_equal(getattr(found, name)[k], getattr(single, name), strict=False)
+
+
+# --- how an impact ends; ranks and tolerances ------------------------------------------------------------------------
+
+V, NEAR = [-1.0, -2.0, 3.0], [[1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]]
+
+
+@pytest.mark.parametrize(("rows", "v", "options", "status", "rank"), [
+    (np.eye(3), V, {}, "complete", 3),
+    (np.eye(3), V, {"budget": 2}, "budget", 2),
+    (np.eye(3)[:2], V, {"budget": 2}, "complete", 2),
+    (np.eye(3), V, {"budget": 3}, "complete", 3),
+    (np.eye(3), V, {"budget": 0}, "budget", 0),
+    (np.eye(3), V, {"budget": 10**30}, "complete", 3),
+    (np.tile([1.0, 0.0, 0.0], (6, 1)), V, {"budget": 1}, "complete", 1),
+    (NEAR, V, {"budget": 1, "rank_tolerance": 1e-3}, "complete", 1),
+    (NEAR, V, {"budget": 1, "rank_tolerance": 1e-5}, "budget", 1),
+    (NEAR, V, {"rank_tolerance": 1e-3}, "complete", 1),
+    (NEAR, V, {"rank_tolerance": 1e-5}, "complete", 2),
+    ([[1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]], V, {}, "complete", 2),
+    ([[1.0, 0.0, 0.0], [1.0, 1e-11, 0.0]], V, {}, "complete", 1),
+    ([[1.0, 0.0, 0.0]], [-1e-300, 1e100, 0.0], {}, "cancelled", 1),
+    ([], V, {}, "complete", 0),
+    (np.zeros((2, 3)), V, {}, "complete", 0),
+])
+def test_how_an_impact_ends(rows: Any, v: list[float], options: dict[str, Any], status: str, rank: int) -> None:
+    found = resolve_impact(np.eye(3), rows, v, 0.5, **options)
+    assert (found.status, found.rank, found.rows_used) == (status, rank, options.get("budget"))
+    assert rank > 0 or np.array_equal(found.velocity, v) and not found.impulses.any() and found.energy_change == 0.0
+
+
+def test_a_budget_takes_the_rows_that_close_fastest_and_each_takes_energy() -> None:
+    """Rows orthogonal in the kinetic metric: the fastest are reversed, the others keep their speed."""
+    for seed in range(5):
+        M, _, v = problem(seed, d=5)
+        rows = (np.linalg.cholesky(M) @ np.linalg.qr(np.random.default_rng(seed).normal(size=(5, 4)))[0]).T
+        speeds, change = rows @ v, 0.0
+        rows = rows * [[1.0], [20.0], [0.3], [4.0]]
+        for budget in range(5):
+            found, expected = resolve_impact(M, rows, v, 0.5, budget=budget), speeds.copy()
+            expected[np.argsort(-np.abs(speeds))[:budget]] *= -0.5
+            np.testing.assert_allclose(rows @ found.velocity / [1.0, 20.0, 0.3, 4.0], expected, atol=1e-12)
+            assert found.energy_change <= change
+            change = found.energy_change
+
+
+def light_direction(exponent: int, seed: int) -> Arrays:
+    """M with κ = 10^exponent, the velocity along its lightest direction, rows that turn it into heavy motion."""
+    basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(6, 6)))[0]
+    M = basis * np.logspace(0, -exponent, 6) @ basis.T
+    M = 0.5 * (M + M.T)
+    rows = np.random.default_rng(seed + 100).normal(size=(3, 6)) @ np.linalg.cholesky(M).T
+    return M, rows, basis[:, -1]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_ill_conditioned_elastic_impact_is_exact_for_the_mass_matrix_itself(seed: int) -> None:
+    """κ(M) = 1e12: energy and restitution within 10 d ε √κ. Without the refinement Cholesky's error costs 1e-5."""
+    M, J, v = light_direction(12, seed)
+    found, truth, bound = resolve_impact(M, J, v, 1.0), exact_impact(M, J, v, 1.0), 10 * 6 * EPS * 1e6
+    assert -bound <= relative_energy_gain(M, v, found.velocity) <= 0.0 and 1.0 - found.clamp <= bound
+    length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), J.T), axis=0)
+    assert (np.abs(J @ (found.velocity + v)) <= bound * length * np.sqrt(v @ M @ v)).all()
+    error = np.array([float(Fraction(a) - b) for a, b in zip(found.velocity, truth.velocity, strict=True)])
+    assert np.sqrt(error @ M @ error / (v @ M @ v)) <= bound
+    momentum = np.array([float(f) for f in truth.generalized_impulse])
+    for told in (found.generalized_impulse, J.T @ found.impulses):
+        np.testing.assert_allclose(told, momentum, atol=1e-8 * np.abs(momentum).max())
+
+
+def test_without_the_clamp_rounding_gains_energy_and_with_it_nothing_is_lost_but_rounding() -> None:
+    gains: dict[bool, list[float]] = {True: [], False: []}
+    for seed in range(20):
+        for clamp, of in gains.items():
+            M, J, v = light_direction(2, seed)
+            of.append(relative_energy_gain(M, v, resolve_impact(M, J, v, 1.0, clamp=clamp).velocity))
+    assert max(gains[False]) > 0.0 >= max(gains[True]) and min(gains[True]) > -100 * EPS
+
+
+def test_rounding_of_an_ill_conditioned_mass_matrix_is_not_taken_for_contacts() -> None:
+    """Rank three by construction, κ(M) = 1e12: whitening leaves noise of about ε κ(L) in dependent rows."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        basis = np.linalg.qr(rng.normal(size=(10, 10)))[0]
+        M = basis * np.logspace(0, -12, 10) @ basis.T
+        rows = rng.normal(size=(40, 3)) @ rng.normal(size=(3, 10))
+        assert resolve_impact(0.5 * (M + M.T), rows, rng.normal(size=10), 0.5).rank == 3
+
+
+def test_a_face_struck_at_three_points_keeps_its_tangential_speed() -> None:
+    """Rows (n, (r × n)_z) of exact rank two; a tolerance below their rounding would brake the face."""
+    braked = 0.0
+    for angle in np.linspace(0.1, 6.2, 37):
+        n, t = np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
+        points = [arm * t - 0.3 * n for arm in (-0.5, 0.1, 0.5)]
+        rows = np.array([[*n, r[0] * n[1] - r[1] * n[0]] for r in points])
+        found = resolve_impact(np.diag([2.0, 2.0, 0.1]), rows, [*(3.0 * t - n), 0.0], 0.5)
+        assert found.rank == 2
+        np.testing.assert_allclose(found.velocity, [*(3.0 * t + 0.5 * n), 0.0], atol=1e-14)
+        wrong = resolve_impact(np.diag([2.0, 2.0, 0.1]), rows, [*(3.0 * t), 0.0], 0.0, rank_tolerance=1e-18)
+        braked = max(braked, abs(wrong.velocity[:2] @ t - 3.0))
+    assert braked > 1.0
+
+
+def test_ten_thousand_contacts() -> None:
+    rng = np.random.default_rng(7)
+    M, _, v = problem(7, d=6)
+    rows = rng.normal(size=(10_000, 3)) @ rng.normal(size=(3, 6))
+    found = resolve_impact(M, rows, v, 0.9)
+    assert found.rank == 3
+    assert np.abs(rows @ found.velocity + 0.9 * (rows @ v)).max() <= 1e-12 * np.abs(rows).max()
+    np.testing.assert_allclose(rows.T @ found.impulses, M @ (found.velocity - v), atol=1e-11)
+
+
+def test_a_plastic_blow_to_the_straight_arm_takes_what_the_paper_says() -> None:
+    """Fig. 3 with slender rods: 7/3 J before; all of it lost at 0.5 m, 0.379845 J left at 0.7 m."""
+    M = np.array([[8 / 3, 5 / 6], [5 / 6, 1 / 3]])
+    for reach, left in ((0.5, 0.0), (0.7, 0.379845)):
+        found = resolve_impact(M, [[1.0 + reach, reach]], [-1.0, -1.0], 0.0)
+        assert 7 / 3 + found.energy_change == pytest.approx(left, abs=1e-6)
+
+
+# --- contacts that only push -----------------------------------------------------------------------------------------
+
+BAR_MASS, BAR_ROWS = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])
+BAR_VELOCITY = np.linalg.solve(BAR_ROWS, [-1.0, -1.0])  # falling without turning
+
+
+@given(seed=st.integers(0, 100_000), d=st.integers(2, 6), c=st.integers(2, 6))
+def test_unequal_restitution_is_poissons_law(seed: int, d: int, c: int) -> None:
+    """Two least squares without negative parts; what dependent rows leave open is still passive and only pushes."""
+    M, J, v = problem(seed, d, c)
+    J, rng = J * 10.0 ** np.random.default_rng(seed).uniform(-2, 2, (c, 1)), np.random.default_rng(seed + 1)
+    J[-1] *= rng.random() < 0.8
+    e = rng.uniform(0.0, 1.0, c)
+    found = resolve_impact(M, J, v, e)
+    size = np.sqrt(v @ M @ v)
+    length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), J.T), axis=0)
+    assert found.law == "Poisson, two LCPs" and found.status == "complete"
+    assert found.energy_change <= 0.0 and found.impulses.min() >= 0.0 and found.clamp >= 1.0 - 1e-13
+    assert (J @ found.velocity >= -1e-11 * size * length).all()
+    np.testing.assert_allclose(M @ (found.velocity - v), J.T @ found.impulses, atol=1e-10 * size * np.abs(M).max())
+    if np.linalg.matrix_rank(J[length > 0.0]) == np.count_nonzero(length):
+        v_plus, p = poisson(M, J[length > 0.0], v, e[length > 0.0])
+        np.testing.assert_allclose(found.velocity, v_plus, atol=1e-8 * np.abs(v).max())
+        np.testing.assert_allclose(found.impulses[length > 0.0], p, atol=1e-7 * (p.max() + size))
+        assert found.rank == np.count_nonzero(p > 1e-9 * p.max(initial=0.0))
+
+
+def test_where_all_approach_and_push_poissons_law_is_the_scalar_rule() -> None:
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        rows = rng.uniform(0.0, 1.0, (3, 5)) + np.eye(3, 5)  # no two rows oppose one another
+        u, e = -rows.T @ rng.uniform(0.1, 1.0, 3), float(rng.uniform())  # then p = (1 + e) × those weights > 0
+        scalar, pushed = resolve_impact(np.eye(5), rows, u, e), resolve_impact(np.eye(5), rows, u, e, method="poisson")
+        np.testing.assert_allclose(pushed.velocity, scalar.velocity, atol=1e-12)
+        same = resolve_impact(np.eye(5), rows, u, np.full(3, e))
+        assert np.array_equal(same.velocity, scalar.velocity) and same.law == scalar.law
+
+
+def test_equalities_with_unequal_restitution_gain_energy_on_the_bar_and_poissons_law_does_not() -> None:
+    """KE 0.5 → 12.167 J when both contacts are made to obey their own e."""
+    wrong = np.linalg.solve(BAR_ROWS, [1.0, 0.0])
+    assert 0.5 * BAR_VELOCITY @ BAR_MASS @ BAR_VELOCITY == pytest.approx(0.5)
+    assert 0.5 * wrong @ BAR_MASS @ wrong == pytest.approx(12.1666667)
+    for copies in (1, 2, 10, 300):
+        rows, e = np.tile(BAR_ROWS, (copies, 1)), np.tile([1.0, 0.0], copies)
+        found = resolve_impact(BAR_MASS, rows, BAR_VELOCITY, e, clamp=False)
+        assert found.energy_change <= 1e-14 and found.impulses.min() >= 0.0
+        assert (rows @ found.velocity).min() >= -1e-12
+
+
+def test_returning_each_contacts_own_share_and_no_more_leaves_one_approaching() -> None:
+    """p = (I + E) p_c alone is not sound; the second LCP repairs it."""
+    rows, v = np.array([[1.0, 0.0], [-0.8, 0.6]]), np.array([-1.0, -2.0])
+    compressed = resolve_impact(np.eye(2), rows, v, 0.0, method="poisson").impulses
+    naive = v + rows.T @ (compressed * [2.0, 1.0])
+    assert (rows @ naive).min() < -0.1
+    assert (rows @ resolve_impact(np.eye(2), rows, v, [1.0, 0.0]).velocity).min() >= -1e-14
+
+
+@pytest.mark.parametrize(("rows", "v", "v_plus", "p"), [
+    (np.eye(2), [1.0, 2.0], [1.0, 2.0], [0.0, 0.0]),  # both separate
+    ([[1.0, 0.0], [-1.0, 0.0]], [-2.0, 3.0], [0.0, 3.0], None),  # opposed: nothing can return
+    (np.eye(2), [-1.0, 1.0], [0.5, 1.0], [1.5, 0.0]),
+])
+def test_only_what_closes_is_pushed(rows: Any, v: list[float], v_plus: list[float], p: list[float] | None) -> None:
+    found = resolve_impact(np.eye(2), rows, v, 0.5, method="poisson")
+    np.testing.assert_allclose(found.velocity, v_plus, atol=1e-15)
+    assert p is None or found.impulses.tolist() == p
+
+
+def test_many_contacts_that_all_face_the_motion_are_settled() -> None:
+    """Forty normals about one direction, struck along it: several rows stop pushing at once, the nearest goes first."""
+    for seed in (25, 90, 101, 103, 109, 110, 133):
+        rng = np.random.default_rng(seed)
+        rows = rng.normal(size=(40, 10)) + rng.normal(size=10)
+        rows /= np.linalg.norm(rows, axis=1)[:, None]
+        v = -0.3 * rows.sum(axis=0) + rng.normal(size=10)
+        found = resolve_impact(np.eye(10), rows, v, 0.0, method="poisson")
+        speeds, size = rows @ found.velocity, np.linalg.norm(v)
+        assert found.impulses.min() >= 0.0 and speeds.min() >= -1e-11 * size
+        assert np.abs(found.impulses * speeds).max() <= 1e-10 * size * (1.0 + found.impulses.max())
+
+
+@pytest.mark.parametrize("difference", [1e-5, 1e-8, 1e-10, 1e-12, 1e-14])
+def test_nearly_parallel_contacts_converge(difference: float) -> None:
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        rows = np.array([1.0, 0.0, 0.0]) + difference * rng.normal(size=(8, 3))
+        found = resolve_impact(np.diag([1.0, 2.0, 3.0]), rows, [-1.0, 0.5, -0.5], rng.uniform(0, 1, 8), clamp=False)
+        assert found.energy_change <= 1e-13 and (rows @ found.velocity).min() >= -1e-10
+
+
+# --- friction in an impact -------------------------------------------------------------------------------------------
+
+
+def rubbing(seed: int, most: float = 2.0) -> tuple[Any, ...]:
+    """M, J, T, v, e, μ up to `most`: couplings strong enough that limits may never settle."""
+    rng = np.random.default_rng(seed)
+    d, c, m = int(rng.integers(2, 8)), int(rng.integers(1, 5)), int(rng.integers(1, 3))
+    root = rng.normal(size=(d, d))
+    rows, tangents, v = rng.normal(size=(c, d)), rng.normal(size=(c, m, d)), rng.normal(size=d)
+    e, mu = float(rng.choice([0.0, 0.4, 1.0])), rng.uniform(0.0, most, c)
+    return root @ root.T + 0.1 * np.eye(d), rows, tangents, v, e, mu
+
+
+@pytest.mark.parametrize("most", [1.0, 2.0])
+def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float) -> None:
+    """M Δv = Jᵀp + Tᵀp_t within the cones; sticks or slides if complete; reduced no more than its energy demands."""
+    seen: dict[str, int] = {"complete": 0, "reduced": 0, "obeyed": 0, "cut": 0}
+    for seed in range(300):
+        M, J, T, v, e, mu = rubbing(seed, most)
+        found, plain = resolve_frictional_impact(M, J, T, v, e, mu), resolve_impact(M, J, v, e)
+        p, p_t, energy = found.impulses, found.tangential_impulses, float(v @ M @ v)
+        assert found.energy_change <= 0.0
+        scale = np.abs(J) @ (np.abs(v) + np.abs(found.velocity) + np.abs(plain.velocity))
+        assert np.all(np.abs(J @ (found.velocity - plain.velocity)) <= 1e-9 * scale)
+        pushed = J.T @ p + np.einsum("cmd,cm->d", T, p_t)
+        size = np.abs(J).T @ np.abs(p) + np.einsum("cmd,cm->d", np.abs(T), np.abs(p_t)) + np.abs(M @ v)
+        for momentum in (M @ (found.velocity - v), found.generalized_impulse):
+            assert np.all(np.abs(momentum - pushed) <= 1e-8 * size)
+        limit = mu * np.maximum(p, 0.0)
+        assert np.all(np.linalg.norm(p_t, axis=1) <= limit * (1 + 1e-9) + 1e-12 * np.abs(p).max())
+        seen[found.status] += 1
+        if found.friction_share < 1.0 - 1e-9 and found.status == "complete":  # as much as keeps the energy
+            seen["cut"] += 1
+            assert found.energy_change == pytest.approx(0.0, abs=1e-9 * energy)
+        elif found.status == "complete" and plain.impulses.min() > 0.0 and len(J) * (1 + T.shape[1]) <= len(v):
+            seen["obeyed"] += 1
+            worst = breach_of_coulomb(T, p_t, limit, found.velocity)
+            assert worst <= 1e-7 * np.abs(T).max() * np.linalg.norm(v) * len(v)
+    assert seen["obeyed"] > 10 and seen["cut"] > 3 and seen["reduced"] < 30 * most
+    assert most == 1.0 or seen["reduced"] > 0
+
+
+@pytest.mark.parametrize("seed", [12, 41, 45, 104, 133, 172, 233, 354, 369])
+def test_limits_that_swing_at_first_settle(seed: int) -> None:
+    """Without damping, or with another one than half and a fifth, these do not within the rounds."""
+    assert resolve_frictional_impact(*rubbing(seed, 1.0)).status == "complete"
+
+
+def test_whole_friction_would_make_some_impacts_gain_energy() -> None:
+    """Kane and Levinson: elastic, whole, it gains; the share kept of it does not."""
+    gains = []
+    for seed in range(40):
+        M, J, T, v, *_ = rubbing(seed)
+        found, bounced = resolve_frictional_impact(M, J, T, v, 1.0, 0.5), resolve_impact(M, J, v, 1.0).velocity
+        if 0.0 < found.friction_share < 1.0:
+            whole = bounced + (found.velocity - bounced) / found.friction_share
+            gains.append(0.5 * whole @ M @ whole - 0.5 * v @ M @ v)
+    assert max(gains) > 1e-3
+
+
+@pytest.mark.parametrize(("v", "mu", "v_plus"), [
+    ([3.0, -1.0], 0.4, [2.4, 0.5]), ([0.3, -1.0], 0.4, [0.0, 0.5]), ([-3.0, -1.0], 0.4, [-2.4, 0.5]),
+    ([3.0, -1.0], 0.0, [3.0, 0.5]),
+])
+def test_a_point_mass_thrown_at_a_floor_sticks_or_slides(v: list[float], mu: float, v_plus: list[float]) -> None:
+    """Friction takes at most μ (1 + e) |v_n| of the tangential speed."""
+    found = resolve_frictional_impact(2.0 * np.eye(2), [[0.0, 1.0]], [[1.0, 0.0]], v, 0.5, mu)
+    np.testing.assert_allclose(found.velocity, v_plus, atol=1e-15)
+    np.testing.assert_allclose(found.tangential_impulses, [[2.0 * (v_plus[0] - v[0])]], atol=1e-15)
+    assert found.friction_share == 1.0 and found.status == "complete"
+
+
+def on_the_floor(points: Any) -> tuple[Any, Any, Any]:
+    """M, J and T of a unit mass whose given points (c, 3) strike the floor z = 0."""
+    jacobians = [np.hstack([np.eye(3), np.cross(np.eye(3), arm)]) for arm in np.asarray(points, float)]
+    M = np.diag([1.0, 1.0, 1.0, 0.02, 0.03, 0.04])
+    return M, np.array([j[2] for j in jacobians]), np.array([j[:2] for j in jacobians])
+
+
+@pytest.mark.parametrize("v", [[3, -1, -2, 0, 0, 0], [0.05, 0.1, -2, 0, 0, 0.1], [1, 0.5, -2, 0.3, 0.2, 1]])
+def test_redundant_contacts_settle_and_more_of_them_change_nothing(v: list[float]) -> None:
+    """Nine points of one face: the normal impulses are not unique, the motion of a flat sliding bounce is."""
+    corners = [(x, y, -0.1) for x in (-0.2, 0.2) for y in (-0.3, 0.3)]
+    middles = [(x, y, -0.1) for x in (-0.2, 0.0, 0.2) for y in (-0.3, 0.0, 0.3) if x == 0.0 or y == 0.0]
+    four = resolve_frictional_impact(*on_the_floor(corners), v, 0.5, 0.3)
+    nine = resolve_frictional_impact(*on_the_floor(corners + middles), v, 0.5, 0.3)
+    assert four.status == nine.status == "complete" and nine.impulses.min() >= 0.0
+    if v[3] == v[5] == 0.0:
+        np.testing.assert_allclose(nine.velocity, four.velocity, atol=1e-10)
+
+
+def test_a_lever_that_sticks_stops_dead() -> None:
+    """Tangents a hundred times apart in inertia, and friction that presses the point down."""
+    jacobian = np.hstack([np.eye(3), np.cross(np.eye(3), [1.0, 0.0, -0.3])])
+    M = np.diag([1.0, 1.0, 1.0, 0.01, 0.01, 0.01])
+    found = resolve_frictional_impact(M, jacobian[2:], jacobian[None, :2], [1.0, 1.0, -1.0, 0.0, 0.0, 0.0], 0.0, 8.0)
+    assert found.status == "complete"
+    np.testing.assert_allclose(jacobian @ found.velocity, 0.0, atol=1e-10)
+
+
+def test_friction_that_loads_its_own_contact_is_solved_exactly() -> None:
+    """A contact that slides while μ ∂p_n/∂p_t is 0.9: p_t = −μ p_n, which plain rounds approach by a tenth each."""
+    jacobian, M = np.array([[1.0, 0.0, 0.9], [0.0, 1.0, 1.0]]), np.diag([1.0, 1.0, 0.5])
+    W = jacobian @ np.linalg.solve(M, jacobian.T)
+    mu = 0.9 * W[1, 1] / W[0, 1]
+    found = resolve_frictional_impact(M, jacobian[1:], jacobian[:1], [50.0, -1.0, 0.0], 0.0, mu)
+    assert found.status == "complete" and found.friction_share == 1.0
+    assert found.tangential_impulses[0, 0] == pytest.approx(-mu * found.impulses[0], rel=1e-9)
+    assert (jacobian @ found.velocity)[1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("power", [-40, 0, 40])
+def test_in_a_corner_friction_has_nothing_to_do_in_any_unit_of_mass(power: int) -> None:
+    """Where every tangent is the other contact's normal, what is left of it is rounding, however light the mass."""
+    for seed in range(20):
+        M, _, v = problem(seed, d=2)
+        normals = np.linalg.qr(np.random.default_rng(seed).normal(size=(2, 2)))[0]
+        found = resolve_frictional_impact(4.0**power * M, normals, normals[::-1, None], v, 0.3, 0.8)
+        assert np.array_equal(found.velocity, resolve_impact(4.0**power * M, normals, v, 0.3).velocity)
+        assert not found.tangential_impulses.any()
+
+
+@given(seed=st.integers(0, 300), mass=st.integers(-60, 60), speed=st.integers(-100, 100))
+def test_units_change_no_bit_of_friction(seed: int, mass: int, speed: int) -> None:
+    M, J, T, v, e, mu = rubbing(seed, 1.0)
+    plain = resolve_frictional_impact(M, J, T, v, e, mu)
+    other = resolve_frictional_impact(np.ldexp(M, 2 * mass), J, T, np.ldexp(v, speed), e, mu)
+    assert np.array_equal(other.velocity, np.ldexp(plain.velocity, speed))
+    assert np.array_equal(other.tangential_impulses, np.ldexp(plain.tangential_impulses, speed + 2 * mass))
+    assert (other.friction_share, other.status) == (plain.friction_share, plain.status)
+
+
+def test_no_contacts_leave_every_bit() -> None:
+    found = resolve_frictional_impact(np.eye(2), [], [], [1.0, -1.0], 0.5, 0.3)
+    assert np.array_equal(found.velocity, [1.0, -1.0]) and found.status == "complete"
+
+
+def test_the_oracle_agrees_with_rationals() -> None:
+    for seed in range(10):
+        M, J, v = problem(seed)
+        v_plus, p = impact(M, np.vstack((J, J[0])), v, 0.5)
+        np.testing.assert_allclose(v_plus, exact_impact(M, J, v, 0.5).rounded_velocity, atol=1e-11)
+        np.testing.assert_allclose(M @ (v_plus - v), np.vstack((J, J[0])).T @ p, atol=1e-10)

@@ -1,0 +1,186 @@
+"""What each border refuses, by the name of the wrong argument: impacts, many impacts, friction, laws, shapes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb import IapbError, RangeError, resolve_frictional_impact, resolve_impact, resolve_impacts
+from iapb.contact.geometry import (
+    Circle,
+    HalfPlane,
+    HalfSpace,
+    Polygon,
+    SpatialBox,
+    Sphere,
+    box,
+    make_shapes,
+    make_spatial_shapes,
+)
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.errors import ArgumentError
+from iapb.scene import find_scene, load_scene
+from iapb.system import System
+
+NAN, INF = float("nan"), float("inf")
+ONE = {"mass_matrix": [[2.0, 0.5], [0.5, 1.0]], "contact_jacobian": np.eye(2), "velocity": [-1.0, 2.0],
+       "restitution": 0.5}
+MANY = {"mass_matrices": np.array([np.eye(2)] * 3), "contact_jacobians": np.ones((3, 1, 2)),
+        "velocities": -np.ones((3, 2)), "restitution": 0.5}
+RUBBING = ONE | {"tangents": np.eye(2)[::-1], "friction": 0.3}
+BORDERS = {"one": (resolve_impact, ONE), "many": (resolve_impacts, MANY),
+           "friction": (resolve_frictional_impact, RUBBING)}
+
+MASSES: list[tuple[Any, str]] = [
+    ([[1.0, 0.0]], ""), ([], ""), (np.zeros((0, 0)), ""), (2.0, ""), ("heavy", ""), (np.eye(2) * (1 + 1j), ""),
+    (np.eye(2, dtype=bool), ""), ([["1", "0"], ["0", "1"]], ""), ([[10**400, 0], [0, 1]], ""),
+    (np.array([[1, True], [True, 2]], dtype=object), ""), ([[1.0, NAN], [NAN, 1.0]], "[0, 1]"),
+    ([[1.0, 0.0], [0.0, INF]], "[1, 1]"), ([[1.0, 0.2], [0.1, 1.0]], "[0, 1]"), ([[1.0, 0.0], [0.0, 0.0]], "[1, 1]"),
+    ([[1.0, 0.0], [0.0, -1.0]], "[1, 1]"), ([[-1.0, 0.0], [0.0, -2.0]], "[1, 1]"), ([[1.0, 3.0], [3.0, 1.0]], "[0, 1]"),
+    ([[1.0, -3.0], [-3.0, 1.0]], "[0, 1]"), ([[1.0, 1.1], [1.1, 1.0]], ""), ([[1.0, 1.0], [1.0, 1.0]], ""),
+    ([[1e-300, 1e300], [1e300, 1e-300]], "[0, 1]"), ([[1e-300, 1e300], [-1e300, 1e-300]], "[0, 1]"),
+    ([[1.0, 2e-9], [0.0, 1.0]], "[0, 1]"),
+]
+VELOCITIES: list[tuple[Any, str]] = [
+    ([1.0], ""), ([[1.0, 2.0]], ""), ([NAN, 1.0], "[0]"), ([1.0, -INF], "[1]"), (None, ""),
+    (np.array([1, 2], dtype="timedelta64[s]"), ""),
+]
+ROWS: list[tuple[Any, str]] = [
+    ([[1.0]], ""), ([1.0, 2.0], ""), (np.zeros((3, 0)), ""), (np.zeros((0, 5)), ""), ([[1.0, 2.0], [3.0]], ""),
+    ([[1.0, INF], [0.0, 1.0]], "[0, 1]"), ([[1.0, 0.0], [NAN, 1.0]], "[1, 0]"),
+    (np.ma.masked_array([[1.0, 0.0]], [[False, True]]), ""),
+]
+ONE_BY_ONE = [("mass_matrix", *each) for each in MASSES] + [("velocity", *each) for each in VELOCITIES] + [
+    ("contact_jacobian", *each) for each in ROWS]
+REFUSED: list[tuple[str, str, Any, str]] = [
+    *((border, *each) for border in ("one", "friction") for each in ONE_BY_ONE),
+    *(("one", "restitution", value, place) for value, place in (
+        (1.0000001, ""), (-1.0000001, ""), (NAN, ""), ("0.5", ""), (None, ""), ([0.5], ""), ([[0.5, 0.5]], ""),
+        ([0.5, -0.1], "[1]"), ([1.1, 0.5], "[0]"), ([0.5, NAN], "[1]"), ([-2.0, -2.0], "[0]"),
+        (np.ma.masked_array([0.5, 0.5], [True, False]), ""))),
+    *((border, name, value, "") for border in ("one", "many") for name, values in (
+        ("clamp", ("no", 0)), ("budget", (-1, 1.5, True)), ("rank_tolerance", (0.0, 1.0, 2.0, NAN, "tight", [1e-8])),
+    ) for value in values),
+    *(("one", "method", value, "") for value in ("magic", ["factored"])),
+    *(("many", name, value, place) for name, value, place in (
+        ("mass_matrices", np.eye(2), ""), ("mass_matrices", np.ones((2, 2, 2)), ""),
+        ("mass_matrices", [np.eye(2), np.eye(2), [[1.0, 0.0], [0.0, NAN]]], "[2, 1, 1]"),
+        ("mass_matrices", [np.eye(2), np.ones((2, 2)), np.eye(2)], "[1]"),
+        ("contact_jacobians", np.ones((3, 1, 3)), ""), ("contact_jacobians", np.full((3, 1, 2), INF), "[0, 0, 0]"),
+        ("velocities", "fast", ""), ("velocities", [[0.0, 0.0], [0.0, NAN], [0.0, 0.0]], "[1, 1]"),
+        ("restitution", [0.5, 1.5, 0.5], "[1]"), ("restitution", NAN, ""), ("restitution", [0.5, 0.5], ""))),
+    *(("friction", name, value, "") for name, value in (
+        ("tangents", [[1.0, 0.0, 0.0]]), ("tangents", [[1.0, 0.0]]), ("tangents", [[NAN, 0.0], [0.0, 1.0]]),
+        ("tangents", np.ones((2, 3, 2))), ("friction", -0.1), ("friction", [0.1] * 3), ("friction", INF),
+        ("restitution", -0.5), ("restitution", [0.1]), ("restitution", 1.5))),
+]
+
+
+@pytest.mark.parametrize(("border", "argument", "value", "place"), REFUSED)
+def test_a_wrong_argument_is_named(border: str, argument: str, value: Any, place: str) -> None:
+    call, given = BORDERS[border]
+    with pytest.raises(ArgumentError) as caught:
+        call(**given | {argument: value})
+    assert caught.value.argument == argument + place
+    assert str(caught.value).startswith(f"{argument}{place} = ") and "expected" in str(caught.value)
+
+
+@pytest.mark.parametrize(("changed", "named"), [
+    ({"budget": 1, "restitution": [0.1, 0.2]}, "budget"), ({"budget": 1, "method": "poisson"}, "budget"),
+    ({"method": "poisson", "restitution": -0.1}, "restitution"),
+])
+def test_arguments_that_do_not_go_together(changed: dict[str, Any], named: str) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        resolve_impact(**ONE | changed)  # type: ignore[arg-type]
+    assert caught.value.argument == named
+
+
+@pytest.mark.parametrize("value", [NAN, 2.0, -1.5])
+def test_a_wrong_restitution_of_no_impacts_is_refused_too(value: float) -> None:
+    empty = {"mass_matrices": np.zeros((0, 3, 3)), "contact_jacobians": np.zeros((0, 2, 3)),
+             "velocities": np.zeros((0, 3)), "restitution": 0.5}
+    assert resolve_impacts(**empty).velocity.shape == (0, 3)  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="^restitution = "):
+        resolve_impacts(**empty | {"restitution": value})  # type: ignore[arg-type]
+
+
+HUGE = 1.7e308
+OVERFLOWS: list[tuple[Any, Any, Any, str]] = [
+    ([[1.0, 0.9], [0.9, 1.0]], [[1.0, 0.0]], [HUGE, HUGE], "velocity"),
+    (1e200 * np.eye(2), [[1.0, 0.0]], [-1e200, 0.0], "generalized_impulse"),
+    (np.eye(2), [[1e-300, 0.0]], [-1e100, 0.0], "impulses"), (np.eye(2), [[1.0, 0.0]], [-1e200, 0.0], "energy_change"),
+]
+
+
+@pytest.mark.parametrize(("M", "J", "v", "quantity"), OVERFLOWS)
+def test_a_result_beyond_doubles_is_named(M: Any, J: Any, v: Any, quantity: str) -> None:
+    with pytest.raises(RangeError) as caught:
+        resolve_impact(M, J, v, 1.0)
+    assert caught.value.quantity == quantity
+    with pytest.raises(RangeError) as caught:
+        resolve_impacts([np.eye(2), M], [J, J], [[-1.0, 0.0], v], 1.0)
+    assert caught.value.quantity == f"{quantity.replace('velocity', 'velocities')}[1]"
+
+
+def test_every_error_has_the_common_root() -> None:
+    assert issubclass(ArgumentError, IapbError) and issubclass(RangeError, IapbError)
+    assert issubclass(ArgumentError, ValueError) and issubclass(RangeError, OverflowError)
+
+
+@pytest.mark.parametrize("rows", [[], (), np.zeros(0), np.zeros((0, 2))])
+def test_no_rows_in_any_form_leave_the_velocity_as_it_is(rows: Any) -> None:
+    for found in (resolve_impact(**ONE | {"contact_jacobian": rows}),  # type: ignore[arg-type]
+                  resolve_frictional_impact(ONE["mass_matrix"], rows, rows, ONE["velocity"], 0.5, 0.3)):
+        assert np.array_equal(found.velocity, [-1.0, 2.0]) and found.impulses.shape == (0,)
+    assert resolve_impacts([ONE["mass_matrix"]], [], [ONE["velocity"]], 0.5).velocity.tolist() == [[-1.0, 2.0]]
+
+
+def test_fractions_and_whole_numbers_in_object_arrays_are_numbers() -> None:
+    exact = np.array([[2, Fraction(1, 2)], [Fraction(1, 2), 1]], dtype=object)
+    found = resolve_impact(exact, np.eye(2), np.array([-1, 2], dtype=object), 0.5)
+    assert np.array_equal(found.velocity, resolve_impact(**ONE).velocity)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("make", "values", "named"), [
+    (Penalty, {"integrator": "euler"}, "integrator"), (ImpulseAugmented, {"rendering": "clip"}, "rendering"),
+    (ImpulseAugmented, {"friction_in_impacts": "yes"}, "friction_in_impacts"),
+    (ImpulseAugmented, {"pushing": 1}, "pushing"),
+    (ImpulseAugmented, {"pushing": True, "friction_in_impacts": True}, "pushing"),
+])
+def test_settings_of_a_law(make: Any, values: dict[str, Any], named: str) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        make(**values)
+    assert caught.value.argument == named
+
+
+def test_a_step_other_than_the_scenes_is_refused() -> None:
+    system = System(load_scene(find_scene("peg_corner")))
+    with pytest.raises(ArgumentError) as caught:
+        Penalty().advance(system, system.make_state(), np.zeros(3), 0.1)
+    assert caught.value.argument == "dt"
+
+
+@pytest.mark.parametrize(("shape", "field"), [
+    (Circle(0.0), "radius"), (Circle(INF), "radius"), (Circle(1.0, (NAN, 0.0)), "center"),
+    (HalfPlane((0, 0), (0, 0)), "normal"), (HalfPlane((0, 0, 0), (0, 1)), "point"),
+    (Polygon([[0, 0], [1, 0]]), "vertices"), (Polygon([[0, 0], [2, 0], [1, 0.5], [1, 2]]), "vertices"),
+    (Polygon([[0, 0], [1, 1], [1, 0], [0, 1]]), "vertices"),
+    (Sphere(-1.0), "radius"), (Sphere(1.0, (0, 0)), "center"), (HalfSpace((0, 0, 0), (0, 0, 0)), "normal"),
+    (SpatialBox((1, 1, 0)), "size"), (SpatialBox((1, 1, 1), rotation=np.diag([1, 1, -1])), "rotation"),
+    (SpatialBox((1, 1, 1), rotation=np.eye(3) + 1e-7), "rotation"),
+])
+def test_shapes_that_are_none(shape: Any, field: str) -> None:
+    make: Any = make_spatial_shapes if isinstance(shape, Sphere | HalfSpace | SpatialBox) else make_shapes
+    with pytest.raises(ArgumentError) as caught:
+        make([Circle(1.0) if make is make_shapes else Sphere(1.0), shape])
+    assert caught.value.argument == f"shapes[1].{field}"
+
+
+def test_a_box_without_a_side_and_a_clockwise_polygon() -> None:
+    with pytest.raises(ArgumentError, match="size"):
+        box((1.0, 0.0))
+    corners = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+    assert np.array_equal(make_shapes([Polygon(corners)]).vertices, corners[::-1])

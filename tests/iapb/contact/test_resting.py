@@ -1,0 +1,169 @@
+"""Resting contact: implicit forces make no energy at any stiffness, Coulomb's friction sticks, slides, dissipates."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.mechanics.integrators import INTEGRATORS
+from iapb.run import Run
+from iapb.scene import Scene
+from iapb.simulation import simulate
+from iapb.system import System
+from tests.iapb.contact.paper import scene_of
+
+FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
+CREEP = 1e-10  # [m/s] docs/theory.md: slower slip sticks
+
+
+def sliders(seed: int, count: int | None = None, **contact: Any) -> Scene:
+    """Balls on a slide between two walls, some overlapping: K to 1e9, 100 Hz to 10 kHz, masses over 8 decades.
+
+    They move by about 1 mm in a step: faster ones could pass through each other, and their gaps would not be linear.
+    """
+    rng = np.random.default_rng(seed)
+    count, rate = count or int(rng.integers(1, 9)), float(10.0 ** rng.uniform(2.0, 4.0))
+    places = np.cumsum(rng.uniform(0.0185, 0.0215, count))
+    bodies = [{"name": f"ball_{k}", "joint": "prismatic", "axis": [1, 0], "mass": float(10.0 ** rng.uniform(-5.0, 3.0)),
+               "shapes": [{"kind": "circle", "radius": 0.01}], "position": [float(x)],
+               "velocity": [float(rng.normal(scale=min(1.0, 1e-3 * rate)))]} for k, x in enumerate(places)]
+    walls = [{"name": f"wall_{side}", "kind": "half_plane", "normal": [-side, 0],
+              "point": [places[0 if side < 0 else -1] + side * (0.01 + rng.uniform(-1e-3, 1e-3)), 0]}
+             for side in (-1, 1)]
+    given = {"stiffness": float(10.0 ** rng.uniform(0.0, 9.0)),
+             "damping": float(rng.choice([0.0, 10.0 ** rng.uniform(-2.0, 6.0)]))}
+    return scene_of(bodies, walls, rate=rate, duration=60.0 / rate, contact=given | contact)
+
+
+def made(run: Run) -> tuple[float, float]:
+    """Return the largest gain of a step, and of the kinetic energy since the start, as shares of the energy there.
+
+    The gain of a step counts the springs of the contacts at its start alone: a contact found late, inside a wall, has
+    an energy that no step has made. Rounding of the gaps, 1e-16 m of 0.1 m, times K is taken off.
+    """
+    K, table, kinetic = run.scene_resolved["contact"]["stiffness"], run.contacts, run.energy["kinetic"]
+    pair = list(zip(table.body_a.tolist(), table.body_b.tolist(), np.sign(table.normal[:, 0]).tolist(), strict=True))
+    gaps = [{pair[i]: min(float(table.gap[i]), 0.0)
+             for i in range(table.offsets[k], table.offsets[k + 1])} for k in range(run.steps)]
+    first = kinetic[0] + 0.5 * K * sum(gap**2 for gap in gaps[0].values())
+    step = 0.0
+    for k, (now, then) in enumerate(zip(gaps[:-1], gaps[1:], strict=True)):
+        before = kinetic[k] + 0.5 * K * sum(gap**2 for gap in now.values())
+        after = kinetic[k + 1] + 0.5 * K * sum(then.get(pair, 0.0) ** 2 for pair in now)
+        noise = K * 1e-16 * sum(abs(gap) for gap in now.values())
+        step = max(step, (after - before - noise) / max(before, 1e-300))
+    return step, float(kinetic.max() / first - 1.0)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_no_stiffness_rate_or_mass_makes_energy_where_gaps_are_linear(seed: int) -> None:
+    run = simulate(sliders(seed), Penalty())
+    step, start = made(run)
+    assert run.complete and step < 1e-9
+    assert start < 1e-9 or run.distrust  # a light ball squeezed through a heavy one: its gap is not linear
+
+
+def test_explicit_springs_do_make_energy_there() -> None:
+    """What the test above must see: the wrong twin of the theorem."""
+    runs = [simulate(sliders(seed, 3, forces="paper"), Penalty()) for seed in range(20)]
+    assert sum(not run.complete or max(made(run)) > 1e-3 for run in runs) > 10
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_implicit_forces_solve_the_complementarity_problem(seed: int) -> None:
+    """0 <= p ⟂ γ⁺ + (p/Δt + K φ)/(K Δt + B) >= 0 in a tower of boxes over nine decades of stiffness and of mass."""
+    rng = np.random.default_rng(100 + seed)
+    bodies = [{"name": f"box_{k}", "joint": "planar", "mass": float(10.0 ** rng.uniform(-2, 2)), "inertia": 1e-2,
+               "shapes": [{"kind": "box", "size": [0.1, 0.1]}], "position": [0.04 * float(rng.uniform(-1, 1)) * k,
+               0.05 - 1e-4 + (0.1 - 1e-4) * k, 0.0]} for k in range(4)]
+    scene = scene_of(bodies, [FLOOR], gravity=[0.3, -9.81], duration=0.01, integrator="semi_implicit_euler", contact={
+        "stiffness": float(10.0 ** rng.uniform(2, 8)), "damping": float(10.0 ** rng.uniform(0, 4))})
+    run, m, h, K = simulate(scene, Penalty()), System(scene).mechanism, 1e-3, scene.contact.stiffness
+    c, k, some = run.contacts, K * h + scene.contact.damping, 0
+    for step in range(run.steps):
+        for i in range(*c.offsets[step : step + 2]):
+            J = m.point_jacobian(run.q[step], int(c.body_a[i]), c.point[i])
+            J = J - m.point_jacobian(run.q[step], int(c.body_b[i]), c.point[i]) if c.body_b[i] >= 0 else J
+            row, p = c.normal[i] @ J, c.normal_force[i]
+            size = np.abs(row) @ np.abs(run.v[step + 1]) + K * abs(c.gap[i]) / k
+            opened = row @ run.v[step + 1] + (p + K * c.gap[i]) / k
+            assert p >= 0.0 and opened >= -1e-7 * size
+            assert p == 0.0 or opened <= 1e-7 * size
+            some += p > 0.0
+    assert some > 4
+
+
+def on_slope(degrees: float, mu: float, v: float = 0.0, **contact: Any) -> Scene:
+    """A box on a level floor, under tilted gravity, at speed v along it."""
+    a, sag = math.radians(degrees), 5e-4 if "stiffness" in contact else 0.0
+    body = {"name": "box", "joint": "planar", "mass": 2.0, "inertia": 5e-3, "position": [0, 0.025 - sag, 0],
+            "velocity": [v, 0, 0], "shapes": [{"kind": "box", "size": [0.15, 0.05]}]}
+    return scene_of([body], [FLOOR], duration=1.0, gravity=[9.81 * math.sin(a), -9.81 * math.cos(a)],
+                    contact={"friction": mu, "coherence_distance": 2e-3} | contact)
+
+
+def test_implicit_friction_creeps_below_the_stated_speed_or_slides_by_coulombs_law() -> None:
+    sticks, slides = simulate(on_slope(20.0, 0.5)), simulate(on_slope(20.0, 0.3))
+    late = sticks.q[800:]
+    assert np.abs(late[-1] - late[0])[:2].max() < CREEP and sticks.friction_force[-1].any()
+    down = 9.81 * (math.sin(math.radians(20.0)) - 0.3 * math.cos(math.radians(20.0)))
+    assert slides.v[-1, 0] == pytest.approx(down, rel=5e-3)
+    c = slides.contacts
+    pushes = c.normal_force > 0.0
+    ratio = np.linalg.norm(c.friction_force[pushes], axis=1) / c.normal_force[pushes]
+    assert ratio.max() <= 0.3 * 1.002 and np.median(ratio) == pytest.approx(0.3, rel=1e-3)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize(("slope", "v"), [(20.0, 0.0), (0.0, 0.2), (20.0, -0.3)])
+def test_a_box_stops_and_sticks_under_every_integrator(integrator: str, slope: float, v: float) -> None:
+    """After v² / 2a, a = μ g cos α, up the slope + g sin α; Coulomb's friction of explicit resting forces."""
+    run = simulate(on_slope(slope, 0.5, v, forces="paper", stiffness=1e4), ImpulseAugmented(integrator=integrator))
+    a = math.radians(slope)
+    slows = 9.81 * (0.5 * math.cos(a) + math.sin(a) * (v < 0.0))
+    late = run.q[800:, 0]
+    assert np.ptp(late) < 1e-9 and np.abs(run.v[800:]).max() < 1e-9
+    assert late[-1] == pytest.approx(math.copysign(0.5 * v**2 / slows, v), abs=1.5 * abs(v) * run.dt + 5e-5)
+    assert np.diff(run.energy["friction_work"], prepend=0.0).max() <= 1e-15
+
+
+@pytest.mark.parametrize("masses", [(1.0, 1.0, 1.0, 1.0), (1e-3, 1e3, 1.0, 1e2), (1e3, 1e-3, 1e-3, 1.0)])
+def test_friction_takes_energy_where_its_sweeps_have_not_settled_too(masses: tuple[float, ...]) -> None:
+    """A pile of a cuboid and balls on a floor; Δv = Δt M⁻¹ F_f never adds energy, nor does F_f push along the slip."""
+    shapes = [{"kind": "box", "size": [0.4, 0.4, 0.2]}, *[{"kind": "sphere", "radius": 0.1}] * 3]
+    places = [[0, 0, 0.099], [-0.15, 0.02, 0.347], [0, 0.02, 0.297], [0.15, 0.02, 0.347]]
+    bodies = [{"name": f"b{k}", "joint": "free_flyer", "mass": m, "inertia": [0.01 * m, 0.02 * m, 0.03 * m],
+               "shapes": [shape], "position": [*place, 0, 0, 0, 1]}
+              for k, (m, shape, place) in enumerate(zip(masses, shapes, places, strict=True))]
+    floor = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
+    scene = scene_of(bodies, [floor], gravity=[2, 1, -9.81], integrator="semi_implicit_euler", duration=0.02,
+                     contact={"forces": "paper", "stiffness": 2000, "damping": 5, "friction": 0.6})
+    run, m = simulate(scene, Penalty()), System(scene).mechanism
+    for k in range(run.steps):
+        M, after, force = m.mass_matrix(run.q[k]), run.v[k + 1], run.friction_force[k]
+        free = after - run.dt * np.linalg.solve(M, force)
+        assert after @ M @ after <= (free @ M @ free) * (1.0 + 1e-12)
+        assert force @ after <= 1e-12 * np.abs(force) @ np.abs(after)
+    assert run.friction_force.any()
+
+
+def test_chosen_stiffness_lets_a_stack_sag_by_less_than_a_tenth_of_a_millimetre() -> None:
+    bodies = [{"name": f"box_{k}", "joint": "planar", "mass": m, "inertia": m / 600.0,
+               "position": [0, 0.05 + 0.1 * k, 0], "shapes": [{"kind": "box", "size": [0.1, 0.1]}]}
+              for k, m in enumerate((1e-3, 1.0, 1000.0))]
+    run = simulate(scene_of(bodies, [FLOOR], gravity=[0, -9.81], duration=1.0))
+    assert -1e-4 < run.contacts.gap.min() < 0.0 and not run.distrust and run.remarks
+
+
+def test_a_pulling_contact_of_5_as_printed_gets_no_friction_and_the_clamp_cuts_it() -> None:
+    """Thrown upwards out of the floor, sliding: −K s − B v_n < 0."""
+    for penalty, pulls in (("printed", True), ("clamped", False)):
+        scene = on_slope(0.0, 0.5, 0.3, forces="paper", penalty=penalty, friction_law="regularised", damping=500.0)
+        run = simulate(scene.with_values({"bodies.box.velocity": [0.3, 1.0, 0.0]}), Penalty(), steps=1)
+        force = run.contacts.normal_force
+        assert len(force) == 2 and ((force < 0.0) == pulls).all() and (pulls or not force.any())
+        assert not run.contacts.friction_force.any()
