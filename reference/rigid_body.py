@@ -287,7 +287,6 @@ def _joint_models(pinocchio: ModuleType, body: Body) -> list[tuple[Any, Any]]:
     if kind == "prismatic":
         return [(pinocchio.JointModelPrismaticUnaligned(axis), straight)]
     whole = {
-        "planar_se2": pinocchio.JointModelPlanar,
         "spherical": pinocchio.JointModelSpherical,
         "free_flyer": pinocchio.JointModelFreeFlyer,
     }

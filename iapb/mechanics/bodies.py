@@ -1,4 +1,4 @@
-"""Rigid bodies with inertia and joint, and the order of the trees of a mechanism."""
+"""Rigid bodies with inertia and joint, the trees that they form, and arrays of numbers given by a caller."""
 
 from __future__ import annotations
 
@@ -20,64 +20,36 @@ ROTATION_TOLERANCE = 1e-8
 SYMMETRY_TOLERANCE = 1e-12
 
 
-def no_placement() -> tuple[Floats, Floats]:
-    """Return the placement of a joint frame that equals the parent's frame."""
-    return np.eye(3), np.zeros(3)
+def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """Return value as a contiguous float array of that shape (-1: any length), without a copy if it is one already.
+
+    Raises
+    ------
+    ArgumentError
+        Wrong shape, or not numbers. Entries may be NaN or infinite.
+    """
+    expected = f"numbers of shape {shape}".replace("-1", "n")
+    try:
+        array = np.asarray(value, np.float64, "C")
+    except (TypeError, ValueError):
+        raise ArgumentError(argument, value, expected) from None
+    if array.ndim != len(shape) or any(n not in (-1, m) for n, m in zip(shape, array.shape, strict=True)):
+        raise ArgumentError(f"{argument} of shape", array.shape, expected)
+    return array
 
 
 def finite_array(argument: str, value: ArrayLike, shape: tuple[int, ...], unit: str = "") -> Floats:
-    """Return value as a float array of that shape.
+    """Return a copy of value as a float array of that shape.
 
     Raises
     ------
     ArgumentError
         Wrong shape, not numbers, NaN or infinite.
     """
-    expected = f"finite numbers of shape {shape}{f' [{unit}]' if unit else ''}"
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ArgumentError(argument, value, expected) from None
-    if array.shape != shape or not np.isfinite(array).all():
-        raise ArgumentError(argument, value, expected)
+    array = float_array(argument, value, shape).copy()
+    if not np.isfinite(array).all():
+        raise ArgumentError(argument, value, f"finite numbers{f' [{unit}]' if unit else ''}")
     return array
-
-
-def float_vector(argument: str, value: ArrayLike, size: int) -> Floats:
-    """Return value as a contiguous float vector, without a copy if it is one already; entries may be NaN or infinite.
-
-    Raises
-    ------
-    ArgumentError
-        Wrong shape, or not numbers.
-    """
-    try:
-        vector = np.asarray(value, np.float64, "C")
-    except (TypeError, ValueError):
-        return finite_array(argument, value, (size,))
-    return vector if vector.shape == (size,) else finite_array(argument, value, (size,))
-
-
-def float_rows(argument: str, value: ArrayLike, columns: int) -> Floats:
-    """Return value as a contiguous float array (rows, columns), under the rules of `float_vector`."""
-    try:
-        rows = np.asarray(value, np.float64, "C")
-    except (TypeError, ValueError):
-        raise ArgumentError(argument, value, f"numbers of shape (rows, {columns})") from None
-    if rows.ndim != 2 or rows.shape[1] != columns:
-        raise ArgumentError(f"{argument} of shape", rows.shape, f"(rows, {columns})")
-    return rows
-
-
-def _check_rotation(argument: str, rotation: Floats) -> None:
-    error = np.abs(rotation.T @ rotation - np.eye(3)).max()
-    if error > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
-        raise ArgumentError(argument, rotation, "a rotation matrix (orthonormal, determinant +1)")
-
-
-def _check_symmetric(argument: str, inertia: Floats) -> None:
-    if np.abs(inertia - inertia.T).max() > SYMMETRY_TOLERANCE * np.abs(inertia).max():
-        raise ArgumentError(argument, inertia, "a symmetric matrix [kg m^2]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +78,7 @@ class Body:
     name: str
     parent: str | None
     joint: Joint
-    placement: tuple[Any, Any] = field(default_factory=no_placement)
+    placement: tuple[Any, Any] = field(default_factory=lambda: (np.eye(3), np.zeros(3)))
     mass: float = 0.0
     center_of_mass: Any = (0.0, 0.0, 0.0)
     inertia: Any = ((0.0,) * 3,) * 3
@@ -118,17 +90,18 @@ class Body:
         mass = float(finite_array(where + "mass", self.mass, (), "kg"))
         center = finite_array(where + "center_of_mass", self.center_of_mass, (3,), "m")
         inertia = finite_array(where + "inertia", self.inertia, (3, 3), "kg m^2")
-        _check_rotation(where + "placement rotation", rotation)
-        _check_symmetric(where + "inertia", inertia)
+        if np.abs(rotation.T @ rotation - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
+            expected = "a rotation matrix (orthonormal, determinant +1)"
+            raise ArgumentError(where + "placement rotation", rotation, expected)
+        if np.abs(inertia - inertia.T).max() > SYMMETRY_TOLERANCE * np.abs(inertia).max():
+            raise ArgumentError(where + "inertia", inertia, "a symmetric matrix [kg m^2]")
         if mass < 0.0:
             raise ArgumentError(where + "mass", mass, "at least 0 kg")
-        checked = {"placement": (rotation, position), "mass": mass, "center_of_mass": center}
-        for name, value in (checked | {"inertia": inertia}).items():
-            object.__setattr__(self, name, value)
+        vars(self).update(placement=(rotation, position), mass=mass, center_of_mass=center, inertia=inertia)
 
 
-def parent_indices(bodies: Sequence[Body]) -> list[int]:
-    """Return each body's parent as an index, -1 = world.
+def parents_and_trees(bodies: Sequence[Body]) -> tuple[list[int], list[int]]:
+    """Return each body's parent as an index, -1 = world, and its tree; trees are numbered in the order of their roots.
 
     Raises
     ------
@@ -138,25 +111,16 @@ def parent_indices(bodies: Sequence[Body]) -> list[int]:
     """
     index: dict[str, int] = {}
     parents: list[int] = []
+    trees: list[int] = []
     for i, body in enumerate(bodies):
         if body.name in index:
             raise ArgumentError(f"bodies[{i}].name", body.name, "a name that no other body has")
         if body.parent is not None and body.parent not in index:
             raise ArgumentError(f"bodies[{i}].parent", body.parent, "None or the name of an earlier body")
+        last = trees[-1] if trees else -1
         parents.append(-1 if body.parent is None else index[body.parent])
+        trees.append(last + 1 if body.parent is None else trees[parents[i]])
+        if trees[i] < last:
+            raise ArgumentError(f"bodies[{i}]", body.name, "the bodies of each tree in sequence")
         index[body.name] = i
-    trees = tree_indices(parents)
-    for i in range(1, len(trees)):
-        if trees[i] < trees[i - 1]:
-            raise ArgumentError(f"bodies[{i}]", bodies[i].name, "the bodies of each tree in sequence")
-    return parents
-
-
-def tree_indices(parents: Sequence[int]) -> list[int]:
-    """Number the trees in the order of their roots and return each body's tree."""
-    trees: list[int] = []
-    roots = 0
-    for parent in parents:
-        trees.append(roots if parent < 0 else trees[parent])
-        roots += parent < 0
-    return trees
+    return parents, trees

@@ -42,24 +42,15 @@ def _summed(values: Floats, before: float | None) -> Floats:
     return np.cumsum(values) if before is None else np.cumsum(np.concatenate([[before], values]))[1:]
 
 
-def passivity_deficit(entered: Floats, stored: float = 0.0) -> float:
-    """Return the largest energy [J] that had left a port beyond what had entered and what was `stored` at the start.
-
-    It is zero for a passive system, whatever happens at the port.
-    """
-    return max(0.0, -float(np.min(entered, initial=0.0)) - stored)
-
-
 def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -> Floats:
     """Return the kinetic energy (n,) [J] taken by the generalized impulse (n, d) at q_k, v_k of each step.
 
     The loss is -(v . P + P . M^-1 P / 2). This is exact also if the clamp or a force limit removed part of the impulse.
     """
     losses, change, lower = np.zeros(len(impulse)), np.zeros(mechanism.nv), np.zeros((mechanism.nv, mechanism.nv))
-    mass_matrix = mechanism.mass_matrix(q[0]) if mechanism.has_constant_mass_matrix and len(q) else None
-    for k in np.unique(np.flatnonzero(impulse) // max(1, mechanism.nv)):
-        matrix = mechanism.mass_matrix(q[k]) if mass_matrix is None else mass_matrix
-        losses[k] = entries.impact_loss(matrix, lower, v[k], impulse[k], change)
+    for k in np.flatnonzero(impulse.any(axis=1)):
+        mass_matrix = mechanism.mass_matrix(q[0 if mechanism.has_constant_mass_matrix else k])
+        losses[k] = entries.impact_loss(mass_matrix, lower, v[k], impulse[k], change)
     return losses
 
 
@@ -100,19 +91,18 @@ def energy_ledger(
     ArgumentError
         Shapes of arrays that do not agree.
     """
-    steps = len(q) - 1
     kinetic, potential = mechanism.energies(q, v, gravity)
-    displacement = mechanism.displacements(q, straight)
+    displacement, before = mechanism.displacements(q, straight), before or {}
+    for name, force in {**forces, "impulse": impulse}.items():
+        if np.shape(force) != displacement.shape:
+            raise ArgumentError(f"{name} of shape", np.shape(force), str(displacement.shape))
     ledger = {"kinetic": kinetic, "potential": potential}
-    for name, force in (dict(forces) | {"impulse": impulse}).items():
-        if np.shape(force) != (steps, mechanism.nv):
-            raise ArgumentError(f"{name} of shape", np.shape(force), f"({steps}, {mechanism.nv})")
     for name, force in forces.items():
-        ledger[f"{name}_work"] = port_energy(force, displacement, _entry(before, f"{name}_work"))
-    ledger["impact_loss"] = _summed(impact_losses(mechanism, q, v, impulse), _entry(before, "impact_loss"))
+        ledger[f"{name}_work"] = port_energy(force, displacement, before.get(f"{name}_work"))
+    ledger["impact_loss"] = _summed(impact_losses(mechanism, q, v, impulse), before.get("impact_loss"))
     total = kinetic + potential
     explained = sum((ledger[f"{name}_work"] for name in forces), -ledger["impact_loss"])
-    ledger["integration_residual"] = total[1:] - (total[0] if before is None else before[_AT_FIRST]) - explained
+    ledger["integration_residual"] = total[1:] - before.get(_AT_FIRST, total[0]) - explained
     return ledger
 
 
@@ -121,13 +111,8 @@ _AT_FIRST = "energy at the start"
 
 def last_of(ledger: Mapping[str, Floats], before: Mapping[str, float] | None) -> dict[str, float]:
     """Return the sums at the end of a ledger, as the argument `before` for the steps that follow."""
-    first = ledger["kinetic"][0] + ledger["potential"][0] if before is None else before[_AT_FIRST]
-    ends = {name: float(values[-1]) for name, values in ledger.items() if len(values)}
-    return dict(before or {}) | {_AT_FIRST: float(first)} | ends
-
-
-def _entry(before: Mapping[str, float] | None, name: str) -> float | None:
-    return None if before is None else before[name]
+    first = {_AT_FIRST: float(ledger["kinetic"][0] + ledger["potential"][0])}
+    return first | dict(before or {}) | {name: float(values[-1]) for name, values in ledger.items() if len(values)}
 
 
 def moved_straight(run: Run) -> bool:
@@ -144,12 +129,11 @@ def energy_of_run(
     The device adds `device_kinetic` (n + 1,), `device_hand_work` (work of the hand's force on the device: the
     energy that has entered the system through the hand's port) and `device_actuator_work` (n,), all [J].
     """
-    forces = {name: getattr(run, f"{name}_force") for name in FORCES}
+    forces, before = {name: getattr(run, f"{name}_force") for name in FORCES}, before or {}
     ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before, moved_straight(run))
     if device is not None and run.device_q.shape[1]:
         moved = device.displacements(run.device_q)
         ledger["device_kinetic"], _ = device.energies(run.device_q, run.device_v, gravity)
-        ledger["device_hand_work"] = port_energy(
-            run.hand_force[:, slice(*run.tool_dofs)], moved, _entry(before, "device_hand_work"))
-        ledger["device_actuator_work"] = port_energy(run.device_force, moved, _entry(before, "device_actuator_work"))
+        for name, force in (("hand", run.hand_force[:, slice(*run.tool_dofs)]), ("actuator", run.device_force)):
+            ledger[f"device_{name}_work"] = port_energy(force, moved, before.get(f"device_{name}_work"))
     return ledger

@@ -10,7 +10,7 @@ from iapb.compiled import flag
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
 from iapb.mechanics.kernels.arrays import MechanismArrays
 from iapb.mechanics.kernels.free_motion import LINKAGE, RIGID, STRAIGHT, FreeMotion
-from iapb.mechanics.structure import has_velocity_terms, moving_parts, point_inertia, rigid_part
+from iapb.mechanics.structure import has_velocity_terms, moving_parts, point_inertia
 
 
 def make_free_motion(m: MechanismArrays, tree_of_body: np.ndarray) -> FreeMotion:
@@ -18,27 +18,25 @@ def make_free_motion(m: MechanismArrays, tree_of_body: np.ndarray) -> FreeMotion
     count = 1 + int(tree_of_body.max())
     found = FreeMotion(np.zeros(count, np.int64), np.full(count, -1, np.int64), np.zeros(count, np.int64),
                        np.zeros((count, 3)), np.zeros((count, 3, 3)), np.ones((count, 3)), False, False)
-    merged, carriers = moving_parts(m), [b for b in range(len(m.kind)) if m.v_count[b] > 0]
+    parts, carriers = moving_parts(m), np.flatnonzero(m.v_count)
     for t in range(count):
-        bodies = np.flatnonzero(tree_of_body == t).tolist()
-        moving = [b for b in bodies if m.v_count[b] > 0]
+        moving = np.flatnonzero(tree_of_body[carriers] == t).tolist()
         if not moving:
             continue
-        root = found.root[t] = moving[0]
-        kind, at = int(m.kind[root]), carriers.index(root)
-        if len(moving) == 1 and rigid_part(m, root) and kind in (FREE_FLYER, SPHERICAL):
-            found.kind[t], center, inertia = RIGID, merged.center_of_mass[at], merged.inertia[at]
+        first = moving[0]
+        kind, center, inertia = int(parts.kind[first]), parts.center_of_mass[first], parts.inertia[first]
+        found.root[t] = carriers[first]
+        if len(moving) == 1 and kind in (FREE_FLYER, SPHERICAL):
+            found.kind[t] = RIGID
             if kind == FREE_FLYER:
                 found.center[t] = center
             else:
-                inertia = inertia + merged.mass[at] * point_inertia(center)
+                inertia = inertia + parts.mass[first] * point_inertia(center)
             found.moments[t], found.axes[t] = principal_axes(inertia)
-        elif has_velocity_terms(m, bodies):
-            found.kind[t], carried = LINKAGE, {root}
-            for b in bodies:
-                carried |= {b} if m.parent[b] in carried else set()
-            if kind in (FREE_FLYER, PLANAR, SPHERICAL) and carried.issuperset(moving):
-                found.base[t] = m.v_count[root]
+        elif has_velocity_terms(parts, moving):
+            found.kind[t] = LINKAGE
+            if kind in (FREE_FLYER, PLANAR, SPHERICAL) and (parts.parent[moving[1:]] >= 0).all():
+                found.base[t] = parts.v_count[first]
     return found._replace(turning=flag(bool((found.kind != STRAIGHT).any())),
                           linked=flag(bool((found.kind == LINKAGE).any())))
 

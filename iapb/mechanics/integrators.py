@@ -5,13 +5,11 @@
 without contact get half of gravity before and half after they move, so they move with order 2 under gravity, and a
 free rigid body with order 4. With contact, or under forces of a hand or device, the order is 1.
 
-All others are explicit and start a step from (q, v) alone (an impulse may have changed v just before). They evaluate
-the acceleration at given stages. Stage i lies at the fraction `fraction[i]` of the step; it is reached from the start
-of the step with velocity and acceleration of the stage before it, and has the weight `weight[i]`. The compiled step
-reads these numbers; `Integrator.step` does the same in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python
-only; it keeps its fourth order where rotations do not commute.
-
-On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
+All others are explicit and start a step from (q, v) alone (an impulse may have changed v just before). Stage i lies at
+the fraction `fraction[i]` of the step; it is reached from the start of the step with velocity and acceleration of the
+stage before it, and has the weight `weight[i]`. The compiled step reads these numbers; `Integrator.step` does the same
+in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python only; it keeps its fourth order where rotations do
+not commute. On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """
 
 from __future__ import annotations
@@ -21,9 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from iapb.errors import ArgumentError
-from iapb.names import one_of
 
 Floats = NDArray[np.float64]
 Integrate = Callable[[Floats, Floats, float], Floats]  # q, v, dt [s] -> q
@@ -96,10 +91,3 @@ INTEGRATORS: dict[str, Integrator] = {
     )
 }
 COMMUTATOR_FREE_4 = _CommutatorFree4("commutator_free_4", 4, 4, *_STAGES_4)
-
-
-def integrator(name: str) -> Integrator:
-    """Return the integrator of that name."""
-    if name not in INTEGRATORS:
-        raise ArgumentError("integrator", name, one_of(name, INTEGRATORS))
-    return INTEGRATORS[name]

@@ -1,9 +1,9 @@
 """Joint kinds: how many coordinates and velocities each has, what they mean, and their units.
 
 Layouts follow Pinocchio where the configuration is a manifold: continuous (cos, sin); quaternions x, y, z, w;
-free flyer and `planar_se2` velocities in body axes, linear part first. The engine's own `planar` joint is a
-chain x-prismatic, y-prismatic, z-revolute with v = dq/dt in the axes of the joint frame, so that a free
-planar body has a constant mass matrix.
+free flyer velocities in body axes, linear part first. The engine's own `planar` joint is a chain x-prismatic,
+y-prismatic, z-revolute with v = dq/dt in the axes of the joint frame, so that a free planar body has a constant
+mass matrix.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 
 # Codes of the kinds in the kernels.
-FIXED, REVOLUTE, CONTINUOUS, PRISMATIC, PLANAR, PLANAR_SE2, SPHERICAL, FREE_FLYER = range(8)
+FIXED, REVOLUTE, CONTINUOUS, PRISMATIC, PLANAR, SPHERICAL, FREE_FLYER = range(7)
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,10 @@ class JointKind:
 
     name: str
     code: int
-    coordinates: tuple[tuple[str, str], ...]  # (suffix, unit) of each entry of q
+    coordinates: tuple[str, ...]  # suffix of each entry of q
+    coordinate_units: tuple[str, ...]  # m, rad, or 1 for cosines, sines and quaternions
     velocities: tuple[str, ...]  # suffix of each entry of v
-    velocity_units: tuple[str, ...]  # unit of each entry of v
     neutral: tuple[float, ...]  # q of the joint at rest
-    rotating: tuple[bool, ...]  # for each entry of v: rotation (True) or translation along its axis
 
     @property
     def nq(self) -> int:
@@ -41,55 +40,24 @@ class JointKind:
     @property
     def nv(self) -> int:
         """Number of velocity entries."""
-        return len(self.rotating)
+        return len(self.velocities)
 
+    @property
+    def rotating(self) -> tuple[bool, ...]:
+        """For each entry of v: rotation about its axis (True) or translation along it."""
+        return tuple(suffix not in ("x", "y", "z", "position") for suffix in self.velocities)
 
-_TURN = (("angle", "rad"),)
-_SLIDE = (("position", "m"),)
-_UNIT_CIRCLE = (("cos", "1"), ("sin", "1"))
-_PLACE_2D = (("x", "m"), ("y", "m"))
-_PLACE_3D = (*_PLACE_2D, ("z", "m"))
-_QUATERNION = (("qx", "1"), ("qy", "1"), ("qz", "1"), ("qw", "1"))
-_TURNS_3D = ("rx", "ry", "rz")
-_METRES, _RADIANS = ("m/s",), ("rad/s",)
 
 KINDS: dict[str, JointKind] = {
-    kind.name: kind
-    for kind in (
-        JointKind("fixed", FIXED, (), (), (), (), ()),
-        JointKind("revolute", REVOLUTE, _TURN, ("angle",), _RADIANS, (0.0,), (True,)),
-        JointKind("continuous", CONTINUOUS, _UNIT_CIRCLE, ("angle",), _RADIANS, (1.0, 0.0), (True,)),
-        JointKind("prismatic", PRISMATIC, _SLIDE, ("position",), _METRES, (0.0,), (False,)),
-        JointKind(
-            "planar",
-            PLANAR,
-            (*_PLACE_2D, ("theta", "rad")),
-            ("x", "y", "theta"),
-            _METRES * 2 + _RADIANS,
-            (0.0,) * 3,
-            (False, False, True),
-        ),
-        JointKind(
-            "planar_se2",
-            PLANAR_SE2,
-            _PLACE_2D + _UNIT_CIRCLE,
-            ("x", "y", "theta"),
-            _METRES * 2 + _RADIANS,
-            (0.0, 0.0, 1.0, 0.0),
-            (False, False, True),
-        ),
-        JointKind(
-            "spherical", SPHERICAL, _QUATERNION, _TURNS_3D, _RADIANS * 3, (0.0, 0.0, 0.0, 1.0), (True,) * 3
-        ),
-        JointKind(
-            "free_flyer",
-            FREE_FLYER,
-            _PLACE_3D + _QUATERNION,
-            ("x", "y", "z", *_TURNS_3D),
-            _METRES * 3 + _RADIANS * 3,
-            (0.0,) * 6 + (1.0,),
-            (False,) * 3 + (True,) * 3,
-        ),
+    name: JointKind(name, code, tuple(q.split()), tuple(units.split()), tuple(v.split()), neutral)
+    for name, code, q, units, v, neutral in (
+        ("fixed", FIXED, "", "", "", ()),
+        ("revolute", REVOLUTE, "angle", "rad", "angle", (0.0,)),
+        ("continuous", CONTINUOUS, "cos sin", "1 1", "angle", (1.0, 0.0)),
+        ("prismatic", PRISMATIC, "position", "m", "position", (0.0,)),
+        ("planar", PLANAR, "x y theta", "m m rad", "x y theta", (0.0,) * 3),
+        ("spherical", SPHERICAL, "qx qy qz qw", "1 1 1 1", "rx ry rz", (0.0, 0.0, 0.0, 1.0)),
+        ("free_flyer", FREE_FLYER, "x y z qx qy qz qw", "m m m 1 1 1 1", "x y z rx ry rz", (0.0,) * 6 + (1.0,)),
     )
 }
 

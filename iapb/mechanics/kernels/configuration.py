@@ -1,8 +1,7 @@
 """Steps on the configuration manifold: q (+) v dt and its inverse, joint by joint.
 
 Coordinates of vector joints are added. (cos, sin) pairs and quaternions turn by the group exponential and are
-normalized to length one. Velocities in body axes (free flyer, planar_se2) follow the screw motion of SE(3) or SE(2),
-as in Pinocchio.
+normalized to length one. Velocities in body axes (free flyer) follow the screw motion of SE(3), as in Pinocchio.
 """
 
 from math import sqrt
@@ -10,7 +9,7 @@ from math import sqrt
 from iapb.compiled import kernel
 from iapb.elementary import arc_tangent, sine, sine_cosine
 from iapb.linalg import add, cross, dot, scale
-from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR_SE2, SPHERICAL
+from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, SPHERICAL
 
 # Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17, while the
 # closed forms lose digits: 1 - cos keeps eps / angle^2.
@@ -76,38 +75,21 @@ def integrate_free_flyer(q, i, v, k, dt, out):
 
 
 @kernel
-def integrate_planar_se2(q, i, v, k, dt, out):
-    """`integrate_free_flyer` in the plane: q = (x, y, cos, sin), v = (u_x, u_y, omega) in body axes."""
-    u, phi = (v[k] * dt, v[k + 1] * dt, 0.0), (0.0, 0.0, v[k + 2] * dt)
-    first, second = screw_coefficients(abs(phi[2]))
-    turned = cross(phi, u)
-    path = add(u, add(scale(first, turned), scale(second, cross(phi, turned))))
-    c, s = q[i + 2], q[i + 3]
-    out[i] = q[i] + c * path[0] - s * path[1]
-    out[i + 1] = q[i + 1] + s * path[0] + c * path[1]
-    turn_pair(q, i + 2, phi[2], out)
-
-
-@kernel
 def is_vector(kind):
     """Return whether the coordinates of a joint are a vector, with one entry for each velocity."""
-    return kind != CONTINUOUS and kind != SPHERICAL and kind != FREE_FLYER and kind != PLANAR_SE2
+    return kind != CONTINUOUS and kind != SPHERICAL and kind != FREE_FLYER
 
 
 @kernel
 def integrate_body(m, b, q, v, dt, out):
     """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity v."""
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
-    if kind == FIXED:
-        return
-    elif kind == CONTINUOUS:
+    if kind == CONTINUOUS:
         turn_pair(q, i, v[k] * dt, out)
     elif kind == SPHERICAL:
         turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
     elif kind == FREE_FLYER:
         integrate_free_flyer(q, i, v, k, dt, out)
-    elif kind == PLANAR_SE2:
-        integrate_planar_se2(q, i, v, k, dt, out)
     else:
         for j in range(m.v_count[b]):
             out[i + j] = q[i + j] + dt * v[k + j]
@@ -153,9 +135,7 @@ def difference(m, q0, q1, out):
     """out (d,) <- the v with integrate(q0, v, 1) = q1, by the shortest rotations."""
     for b in range(m.kind.shape[0]):
         kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
-        if kind == FIXED:
-            continue
-        elif kind == CONTINUOUS:
+        if kind == CONTINUOUS:
             out[k] = arc_tangent(q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1])
         elif kind == SPHERICAL:
             out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
@@ -165,11 +145,6 @@ def difference(m, q0, q1, out):
             path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
             out[k], out[k + 1], out[k + 2] = inverse_screw(path, phi)
             out[k + 3], out[k + 4], out[k + 5] = phi
-        elif kind == PLANAR_SE2:
-            c, s, x, y = q0[i + 2], q0[i + 3], q1[i] - q0[i], q1[i + 1] - q0[i + 1]
-            turn = arc_tangent(c * q1[i + 3] - s * q1[i + 2], c * q1[i + 2] + s * q1[i + 3])
-            u = inverse_screw((c * x + s * y, c * y - s * x, 0.0), (0.0, 0.0, turn))
-            out[k], out[k + 1], out[k + 2] = u[0], u[1], turn
         else:
             for j in range(m.v_count[b]):
                 out[k + j] = q1[i + j] - q0[i + j]

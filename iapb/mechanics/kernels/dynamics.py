@@ -19,7 +19,7 @@ from iapb.linalg import (
     transform,
     transform_back,
 )
-from iapb.mechanics.joints import FREE_FLYER, PLANAR_SE2
+from iapb.mechanics.joints import FREE_FLYER
 
 
 @kernel
@@ -29,16 +29,20 @@ def turned_inertia(m, w, b, omega):
 
 
 @kernel
-def start_composite(m, w, b):
-    """Composite of b <- body b alone, inertia turned into world axes: R I R^T."""
-    w.composite_mass[b] = m.mass[b]
-    store(w.composite_center, b, load(w.center, b))
-    rotation = w.rotation[b]
-    x, y, z = load(rotation, 0), load(rotation, 1), load(rotation, 2)
-    image_x, image_y, image_z = transform(m.inertia, b, x), transform(m.inertia, b, y), transform(m.inertia, b, z)
-    xx, yy, zz = dot(x, image_x), dot(y, image_y), dot(z, image_z)
-    xy, xz, yz = dot(x, image_y), dot(x, image_z), dot(y, image_z)
-    store_columns(w.composite_inertia, b, (xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+def composite_bodies(m, w):
+    """Write, for each body, mass, centre and inertia of the body and all bodies that it carries."""
+    for b in range(m.kind.shape[0]):
+        w.composite_mass[b] = m.mass[b]
+        store(w.composite_center, b, load(w.center, b))
+        rotation = w.rotation[b]  # the inertia in world axes is R I R^T
+        x, y, z = load(rotation, 0), load(rotation, 1), load(rotation, 2)
+        image_x, image_y, image_z = transform(m.inertia, b, x), transform(m.inertia, b, y), transform(m.inertia, b, z)
+        xx, yy, zz = dot(x, image_x), dot(y, image_y), dot(z, image_z)
+        xy, xz, yz = dot(x, image_y), dot(x, image_z), dot(y, image_z)
+        store_columns(w.composite_inertia, b, (xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    for b in range(m.kind.shape[0] - 1, -1, -1):
+        if m.parent[b] >= 0:
+            merge_composite(w, m.parent[b], b)
 
 
 @kernel
@@ -46,29 +50,16 @@ def merge_composite(w, into, b):
     """Add the composite of b to another: I = I1 + I2 + mu (|r|^2 1 - r r^T), mu = m1 m2 / (m1 + m2)."""
     m1, m2 = w.composite_mass[into], w.composite_mass[b]
     total = m1 + m2
-    c1, c2 = load(w.composite_center, into), load(w.composite_center, b)
-    r = subtract(c2, c1)
+    center = load(w.composite_center, into)
+    r = subtract(load(w.composite_center, b), center)
     share = m2 / total if total > 0.0 else 0.0
-    mu = m1 * share
-    square = dot(r, r)
+    mu, square, inertia, own = m1 * share, dot(r, r), w.composite_inertia[into], w.composite_inertia[b]
     xy, xz, yz = -mu * (r[0] * r[1]), -mu * (r[0] * r[2]), -mu * (r[1] * r[2])
-    xx, yy, zz = mu * (square - r[0] * r[0]), mu * (square - r[1] * r[1]), mu * (square - r[2] * r[2])
-    inertia, own = w.composite_inertia[into], w.composite_inertia[b]
-    accumulate(inertia, 0, add(load(own, 0), (xx, xy, xz)))
-    accumulate(inertia, 1, add(load(own, 1), (xy, yy, yz)))
-    accumulate(inertia, 2, add(load(own, 2), (xz, yz, zz)))
+    accumulate(inertia, 0, add(load(own, 0), (mu * (square - r[0] * r[0]), xy, xz)))
+    accumulate(inertia, 1, add(load(own, 1), (xy, mu * (square - r[1] * r[1]), yz)))
+    accumulate(inertia, 2, add(load(own, 2), (xz, yz, mu * (square - r[2] * r[2]))))
     w.composite_mass[into] = total
-    store(w.composite_center, into, add(c1, scale(share, r)))
-
-
-@kernel
-def composite_bodies(m, w):
-    """Write, for each body, mass, centre and inertia of the body and all bodies that it carries."""
-    for b in range(m.kind.shape[0]):
-        start_composite(m, w, b)
-    for b in range(m.kind.shape[0] - 1, -1, -1):
-        if m.parent[b] >= 0:
-            merge_composite(w, m.parent[b], b)
+    store(w.composite_center, into, add(center, scale(share, r)))
 
 
 @kernel
@@ -151,28 +142,34 @@ def body_velocities(m, w, v):
 
 
 @kernel
-def body_accelerations(m, w, v, dv, g):
-    """Write the accelerations of each body for dv/dt = dv; the world accelerates by -g, which includes the weight.
+def inverse_dynamics(m, w, v, dv, g, out):
+    """out (d,) <- tau = M dv + B(q, v) + G(q) by Newton-Euler; an empty dv counts as zero.
 
-    With r = p_b - p_parent and joint motion (u, s) for v, (u', s') for dv:
+    The world accelerates by -g, which includes the weight. With r = p_b - p_parent and the joint's motion
+    (u, s) for v, (u', s') for dv:
     alpha = alpha_p + omega_p x s + s',
-    a = a_p + alpha_p x r + omega_p x (omega_p x r) + 2 omega_p x u + u' [+ s x u, velocities in body axes].
+    a = a_p + alpha_p x r + omega_p x (omega_p x r + 2 u) + u' [+ s x u, velocities in body axes].
     """
-    zero = (0.0, 0.0, 0.0)
     for b in range(m.kind.shape[0]):
         parent = m.parent[b]
         u, s = relative_motion(m, w, b, v)
-        du, ds = relative_motion(m, w, b, dv)
-        if m.kind[b] == FREE_FLYER or m.kind[b] == PLANAR_SE2:
-            du = add(du, cross(s, u))
-        omega, alpha, a, r = zero, zero, (-g[0], -g[1], -g[2]), zero
+        omega, alpha, a = s, (0.0, 0.0, 0.0), (0.0 - g[0], 0.0 - g[1], 0.0 - g[2])
         if parent >= 0:
-            omega, alpha = load(w.angular_velocity, parent), load(w.angular_acceleration, parent)
-            a = load(w.linear_acceleration, parent)
+            carried, carried_alpha = load(w.angular_velocity, parent), load(w.angular_acceleration, parent)
             r = subtract(load(w.position, b), load(w.position, parent))
-        a = add(a, add(cross(alpha, r), cross(omega, add(cross(omega, r), scale(2.0, u)))))
-        store(w.angular_acceleration, b, add(alpha, add(cross(omega, s), ds)))
-        store(w.linear_acceleration, b, add(a, du))
+            omega, alpha = add(carried, s), add(carried_alpha, cross(carried, s))
+            a = add(load(w.linear_acceleration, parent), cross(carried_alpha, r))
+            a = add(a, cross(carried, add(cross(carried, r), scale(2.0, u))))
+        if m.kind[b] == FREE_FLYER:
+            a = add(a, cross(s, u))
+        if dv.shape[0] > 0:
+            changed_u, changed_s = relative_motion(m, w, b, dv)
+            alpha, a = add(alpha, changed_s), add(a, changed_u)
+        store(w.angular_velocity, b, omega)
+        store(w.angular_acceleration, b, alpha)
+        store(w.linear_acceleration, b, a)
+        newton_euler(m, w, b, omega, alpha, a)
+    project_forces(m, w, out)
 
 
 @kernel
@@ -192,35 +189,6 @@ def newton_euler(m, w, b, omega, alpha, a):
 
 
 @kernel
-def inverse_dynamics(m, w, v, dv, g, out):
-    """out (d,) <- tau = M dv + B(q, v) + G(q) by Newton-Euler."""
-    body_velocities(m, w, v)
-    body_accelerations(m, w, v, dv, g)
-    for b in range(m.kind.shape[0]):
-        omega, alpha = load(w.angular_velocity, b), load(w.angular_acceleration, b)
-        newton_euler(m, w, b, omega, alpha, load(w.linear_acceleration, b))
-    project_forces(m, w, out)
-
-
-@kernel
 def bias(m, w, v, out):
     """out (d,) <- B(q, v): Coriolis and centripetal generalized forces, `inverse_dynamics` without dv/dt and weight."""
-    zero = (0.0, 0.0, 0.0)
-    for b in range(m.kind.shape[0]):
-        parent = m.parent[b]
-        u, s = relative_motion(m, w, b, v)
-        omega, alpha, a = s, zero, zero
-        if parent >= 0:
-            carried = load(w.angular_velocity, parent)
-            carried_alpha = load(w.angular_acceleration, parent)
-            r = subtract(load(w.position, b), load(w.position, parent))
-            omega, alpha = add(carried, s), add(carried_alpha, cross(carried, s))
-            a = add(load(w.linear_acceleration, parent), cross(carried_alpha, r))
-            a = add(a, cross(carried, add(cross(carried, r), scale(2.0, u))))
-        if m.kind[b] == FREE_FLYER or m.kind[b] == PLANAR_SE2:
-            a = add(a, cross(s, u))
-        store(w.angular_velocity, b, omega)
-        store(w.angular_acceleration, b, alpha)
-        store(w.linear_acceleration, b, a)
-        newton_euler(m, w, b, omega, alpha, a)
-    project_forces(m, w, out)
+    inverse_dynamics(m, w, v, v[:0], (0.0, 0.0, 0.0), out)

@@ -15,16 +15,7 @@ from iapb.linalg import (
     transform,
     turn_frame,
 )
-from iapb.mechanics.joints import (
-    CONTINUOUS,
-    FIXED,
-    FREE_FLYER,
-    PLANAR,
-    PLANAR_SE2,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-)
+from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL
 
 
 @kernel
@@ -45,25 +36,17 @@ def turn_about_axis(w, b, a, c, s):
     """Rodrigues: R <- R (c 1 + (1 - c) a a^T + s [a]x), angle with cosine c and sine s."""
     x, y, z = a
     u = 1.0 - c
-    turn_frame(
-        w.rotation,
-        b,
-        (c + u * x * x, u * x * y + s * z, u * x * z - s * y),
-        (u * x * y - s * z, c + u * y * y, u * y * z + s * x),
-        (u * x * z + s * y, u * y * z - s * x, c + u * z * z),
-    )
+    turn_frame(w.rotation, b, (c + u * x * x, u * x * y + s * z, u * x * z - s * y),
+               (u * x * y - s * z, c + u * y * y, u * y * z + s * x),
+               (u * x * z + s * y, u * y * z - s * x, c + u * z * z))
 
 
 @kernel
 def turn_by_quaternion(w, b, x, y, z, s):
     """R <- R R(x, y, z, s), unit quaternion with scalar part s."""
-    turn_frame(
-        w.rotation,
-        b,
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + s * z), 2.0 * (x * z - s * y)),
-        (2.0 * (x * y - s * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + s * x)),
-        (2.0 * (x * z + s * y), 2.0 * (y * z - s * x), 1.0 - 2.0 * (x * x + y * y)),
-    )
+    turn_frame(w.rotation, b, (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + s * z), 2.0 * (x * z - s * y)),
+               (2.0 * (x * y - s * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + s * x)),
+               (2.0 * (x * z + s * y), 2.0 * (y * z - s * x), 1.0 - 2.0 * (x * x + y * y)))
 
 
 @kernel
@@ -83,17 +66,14 @@ def move_joint(m, q, w, b):
         s, c = sine_cosine(q[i + 2])
         turn_about_axis(w, b, (0.0, 0.0, 1.0), c, s)
         store(w.position, b, add(load(w.position, b), shift))
-    elif kind in (REVOLUTE, CONTINUOUS):
-        a = load(m.joint_axis, b)
-        store(w.axis, k, transform(w.rotation, b, a))
-        if kind == REVOLUTE:
-            s, c = sine_cosine(q[i])
-            turn_about_axis(w, b, a, c, s)
-        else:
-            turn_about_axis(w, b, a, q[i], q[i + 1])
     elif kind == PRISMATIC:
         store(w.axis, k, transform(w.rotation, b, load(m.joint_axis, b)))
         store(w.position, b, add(load(w.position, b), scale(q[i], load(w.axis, k))))
+    elif kind in (REVOLUTE, CONTINUOUS):
+        a = load(m.joint_axis, b)
+        store(w.axis, k, transform(w.rotation, b, a))
+        s, c = sine_cosine(q[i]) if kind == REVOLUTE else (q[i + 1], q[i])
+        turn_about_axis(w, b, a, c, s)
     elif kind == SPHERICAL:
         turn_by_quaternion(w, b, q[i], q[i + 1], q[i + 2], q[i + 3])
         body_axes_to_dofs(w, b, k)
@@ -103,11 +83,6 @@ def move_joint(m, q, w, b):
         store(w.position, b, add(load(w.position, b), shift))
         body_axes_to_dofs(w, b, k)
         body_axes_to_dofs(w, b, k + 3)
-    elif kind == PLANAR_SE2:
-        shift = transform(w.rotation, b, (q[i], q[i + 1], 0.0))
-        turn_about_axis(w, b, (0.0, 0.0, 1.0), q[i + 2], q[i + 3])
-        store(w.position, b, add(load(w.position, b), shift))
-        body_axes_to_dofs(w, b, k)
 
 
 @kernel
@@ -150,24 +125,12 @@ def motion_at(m, w, k, x):
 
 
 @kernel
-def point_jacobian(m, w, body, point, out):
-    """out (3, d) <- Jacobian of the velocity of the world point, regarded as fixed to the body."""
+def frame_jacobian(m, w, body, point, out):
+    """out (6, d) <- Jacobian of the velocity of the world point, fixed to the body, and of the angular velocity."""
     out[:] = 0.0
-    x = (point[0], point[1], point[2])
     k = m.last_dof[body]
     while k >= 0:
-        out[0, k], out[1, k], out[2, k] = motion_at(m, w, k, x)
-        k = m.dof_parent[k]
-
-
-@kernel
-def frame_jacobian(m, w, body, out):
-    """out (6, d) <- Jacobian of the body's origin (rows 0 to 2) and angular velocity (3 to 5), world axes."""
-    out[:] = 0.0
-    x = load(w.position, body)
-    k = m.last_dof[body]
-    while k >= 0:
-        out[0, k], out[1, k], out[2, k] = motion_at(m, w, k, x)
+        out[0, k], out[1, k], out[2, k] = motion_at(m, w, k, (point[0], point[1], point[2]))
         if m.dof_rotates[k]:
             out[3, k], out[4, k], out[5, k] = load(w.axis, k)
         k = m.dof_parent[k]
@@ -186,16 +149,3 @@ def add_point_force(m, w, body, point, force, out):
     while k >= 0:
         out[k] += dot(motion_at(m, w, k, x), f)
         k = m.dof_parent[k]
-
-
-@kernel
-def point_velocity(m, w, body, point, v, out):
-    """out (3,) <- velocity J v of the world point, regarded as fixed to the body; zero for body -1."""
-    total = (0.0, 0.0, 0.0)
-    if body >= 0:
-        x = (point[0], point[1], point[2])
-        k = m.last_dof[body]
-        while k >= 0:
-            total = add(total, scale(v[k], motion_at(m, w, k, x)))
-            k = m.dof_parent[k]
-    out[0], out[1], out[2] = total

@@ -23,9 +23,7 @@ def link(name, inside=INERTIAL):
 
 
 def joint(name, parent, child, kind="revolute", inside=""):
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
-    )
+    return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
 
 
 @pytest.fixture
@@ -67,9 +65,9 @@ def test_each_type_gives_its_layout(read):
     links = [link("base"), *(link(f"l{i}") for i in range(len(types)))]
     joints = [joint(f"j{i}", "base", f"l{i}", kind) for i, kind in enumerate(types)]
     mechanism = read(*links, *joints)
-    assert (mechanism.nq, mechanism.nv) == (0 + 1 + 2 + 1 + 4 + 7, 0 + 1 + 1 + 1 + 3 + 6)
+    assert (mechanism.nq, mechanism.nv) == (0 + 1 + 2 + 1 + 3 + 7, 0 + 1 + 1 + 1 + 3 + 6)
     kinds = [body.joint.kind for body in mechanism.bodies]
-    assert kinds == ["fixed", "fixed", "revolute", "continuous", "prismatic", "planar_se2", "free_flyer"]
+    assert kinds == ["fixed", "fixed", "revolute", "continuous", "prismatic", "planar", "free_flyer"]
 
 
 def test_a_floating_base_moves_freely(read):
@@ -99,10 +97,7 @@ MISTAKES = {
     "two parents": ([BASE, ARM, joint("a", "base", "arm"), joint("b", "base", "arm")], "'b'.*child"),
     "zero axis": ([BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 0 0"/>')], "elbow.*axis"),
     "two numbers": ([BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 1"/>')], "elbow.*axis"),
-    "not a number": (
-        [BASE, ARM, joint("j", "base", "arm", inside='<origin rpy="0 0 pi"/>')],
-        "'j'.*origin rpy",
-    ),
+    "not a number": ([BASE, ARM, joint("j", "base", "arm", inside='<origin rpy="0 0 pi"/>')], "'j'.*origin rpy"),
     "infinite": ([BASE, ARM, joint("j", "base", "arm", inside='<origin xyz="0 0 inf"/>')], "'j'.*origin xyz"),
     "negative mass": ([link("base", INERTIAL.replace('value="2"', 'value="-2"'))], "base.*mass"),
     "no mass": ([link("base", "<inertial><origin/></inertial>")], "base.*inertial"),
@@ -122,32 +117,14 @@ def test_mistakes_name_the_element(read, elements, named):
         read(*elements)
 
 
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("<robot><link name='a'></robot>", "well-formed"),
-        ("<model/>", "<robot>"),
-        ("", "well-formed"),
-        ('<!DOCTYPE r [<!ENTITY a "1"><!ENTITY b "&a;&a;">]><robot><link name="&b;"/></robot>', "DOCTYPE"),
-    ],
-)
+@pytest.mark.parametrize(("text", "named"), [
+    ("<robot><link name='a'></robot>", "well-formed"), ("<model/>", "<robot>"), ("", "well-formed"),
+    ('<!DOCTYPE r [<!ENTITY a "1"><!ENTITY b "&a;&a;">]><robot><link name="&b;"/></robot>', "DOCTYPE"),
+])
 def test_files_that_are_no_urdf_are_refused(tmp_path, text, named):
     path = tmp_path / "robot.urdf"
     path.write_text(text)
     with pytest.raises(ArgumentError, match=named):
-        Mechanism.from_urdf(path)
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(ArgumentError, match=r"nowhere\.urdf"):
-        Mechanism.from_urdf(tmp_path / "nowhere.urdf")
-
-
-def test_an_entity_bomb_is_refused_at_once(tmp_path):
-    levels = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 20))
-    path = tmp_path / "bomb.urdf"
-    path.write_text(f'<!DOCTYPE r [<!ENTITY e0 "lol">{levels}]><robot name="&e19;"/>')
-    with pytest.raises(ArgumentError, match="DOCTYPE"):
         Mechanism.from_urdf(path)
 
 
@@ -194,24 +171,17 @@ def test_shapes_are_read_in_link_axes_and_in_the_order_of_the_file(tmp_path: Pat
     assert read["arm"][0].center == pytest.approx([0.4, 0.0, 0.0])
     assert read["arm"][1].lengths == pytest.approx([0.4, 0.02, 0.04])
     cosines, sines = np.cos([0.1, 0.2, 0.3]), np.sin([0.1, 0.2, 0.3])
-    assert read["arm"][1].rotation[:, 0] == pytest.approx(
-        [cosines[2] * cosines[1], sines[2] * cosines[1], -sines[1]]
-    )
+    assert read["arm"][1].rotation[:, 0] == pytest.approx([cosines[2] * cosines[1], sines[2] * cosines[1], -sines[1]])
     assert read["arm"][2].lengths == pytest.approx([0.1, 2.0])
 
 
-@pytest.mark.parametrize(
-    ("element", "said"),
-    [
-        ("<collision/>", "geometry.*nothing"),
-        (collision("<cone/>"), "<cone>.*one of <box>"),
-        (collision('<sphere radius="1"/><sphere radius="1"/>'), "<sphere>, <sphere>"),
-        (collision('<sphere radius="-1"/>'), "lengths > 0"),
-        (collision('<sphere radius="nan"/>'), "sphere radius.*finite"),
-        (collision('<box size="1 2"/>'), "box size.*3 finite numbers"),
-        (collision("<capsule radius='1'/>"), "capsule length"),
-    ],
-)
+@pytest.mark.parametrize(("element", "said"), [
+    ("<collision/>", "geometry.*nothing"), (collision("<cone/>"), "<cone>.*one of <box>"),
+    (collision('<sphere radius="1"/><sphere radius="1"/>'), "<sphere>, <sphere>"),
+    (collision('<sphere radius="-1"/>'), "lengths > 0"), (collision('<sphere radius="nan"/>'), "sphere radius.*finite"),
+    (collision('<box size="1 2"/>'), "box size.*3 finite numbers"),
+    (collision("<capsule radius='1'/>"), "capsule length"),
+])
 def test_wrong_elements_are_named_with_their_link(tmp_path: Path, element: str, said: str) -> None:
     write(tmp_path, element)
     with pytest.raises(ArgumentError, match=f"(?s)link name='arm'.*{said}"):
@@ -244,18 +214,6 @@ def test_what_the_scene_cannot_hold_is_a_mistake_with_its_place_until_shapes_rep
     lines = "collisions: urdf\n    shapes: {base: [], arm: [{kind: sphere, radius: 0.1}]}"
     file.write_text(SCENE.format(lines=lines))
     assert [len(body.shapes) for body in load_scene(file).bodies] == [0, 1]
-
-
-@pytest.mark.parametrize(("lines", "line", "path"), [
-    ("collisions: mesh", 9, "robots[0].collisions"),
-    ("shapes: {arm: [{kind: sphere, radius: -1}]}", 9, "robots[0].shapes.arm"),
-    ("floating: false\n    position: {leg: [0]}", 10, "robots[0].position of robot rob"),
-])
-def test_mistakes_of_a_robot_say_line_and_column(tmp_path: Path, lines: str, line: int, path: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        load_scene(write(tmp_path, BALL, lines=lines))
-    found = caught.value.mistakes[0]
-    assert found.line == line and found.column > 4 and found.path.startswith(path)
 
 
 @pytest.mark.skipif(not (ROBOTS / "allegro_left_hand.urdf").exists(), reason="shared robot files are not here")
