@@ -33,15 +33,15 @@ WITH_AXIS = ("revolute", "continuous", "prismatic")
 LENGTHS = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1},
            "capsule": {"radius": 1, "length": 1}, "mesh": {}}
 
-# element: (children that are read, children of the format that are not, attributes)
-_FORMAT: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...] | None]] = {
-    "robot": (("link", "joint"), ("material", "transmission", "gazebo"), None),
-    "link": (("inertial", "collision"), ("visual", "contact", "sensor"), None),
+# element: (children that are read, children of the format that are not, attributes; none: any)
+_FORMAT: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
+    "robot": (("link", "joint"), ("material", "transmission", "gazebo"), ()),
+    "link": (("inertial", "collision"), ("visual", "contact", "sensor"), ()),
     "joint": (("origin", "parent", "child", "axis"),
-              ("calibration", "dynamics", "limit", "mimic", "safety_controller", "hardwareInterface"), None),
-    "inertial": (("origin", "mass", "inertia"), (), None),
-    "collision": (("origin", "geometry"), ("material", "verbose"), None),
-    "geometry": (tuple(LENGTHS), (), None),
+              ("calibration", "dynamics", "limit", "mimic", "safety_controller", "hardwareInterface"), ()),
+    "inertial": (("origin", "mass", "inertia"), (), ()),
+    "collision": (("origin", "geometry"), ("material", "verbose"), ()),
+    "geometry": (tuple(LENGTHS), (), ()),
     "origin": ((), (), ("xyz", "rpy", "quat_xyzw")),
     "mass": ((), (), ("value",)),
     "inertia": ((), (), ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
@@ -236,9 +236,9 @@ def _check_spelling(element: ElementTree.Element, where: str) -> None:
     Elements of other tools (<gazebo>, <transmission>, <contact> …) are allowed, as the format intends. A name that
     nearly equals an element that is read counts as an error: otherwise a link could lose its mass without a message.
     """
-    read, others, attributes = _FORMAT.get(str(element.tag), ((), (), None))
-    for name, value in element.attrib.items() if attributes is not None else ():
-        if name not in attributes and not name.startswith("{"):  # attributes of other XML namespaces are allowed
+    read, others, attributes = _FORMAT.get(str(element.tag), ((), (), ()))
+    for name, value in element.attrib.items():
+        if attributes and name not in attributes and not name.startswith("{"):  # {…}: of another XML namespace
             raise ArgumentError(f"{where} {name}", value, one_of(name, attributes, "one of its attributes: "))
     seen: set[str] = set()
     for child in element:
