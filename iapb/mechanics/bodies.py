@@ -21,20 +21,20 @@ SYMMETRY_TOLERANCE = 1e-12
 
 
 def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return value as a contiguous float array of that shape (-1: any length), without a copy if it is one already.
+    """Return value as a contiguous float array of that shape (-1 first: any length), not copied if it is one.
 
     Raises
     ------
     ArgumentError
         Wrong shape, or not numbers. Entries may be NaN or infinite.
     """
-    expected = f"numbers of shape {shape}".replace("-1", "n")
     try:
         array = np.asarray(value, np.float64, "C")
     except (TypeError, ValueError):
-        raise ArgumentError(argument, value, expected) from None
-    if array.ndim != len(shape) or any(n not in (-1, m) for n, m in zip(shape, array.shape, strict=True)):
-        raise ArgumentError(f"{argument} of shape", array.shape, expected)
+        raise ArgumentError(argument, value, f"numbers of shape {shape}".replace("-1", "n")) from None
+    wanted = (len(array), *shape[1:]) if array.ndim and shape[:1] == (-1,) else shape
+    if array.shape != wanted:
+        raise ArgumentError(f"{argument} of shape", array.shape, str(shape).replace("-1", "n"))
     return array
 
 
