@@ -32,8 +32,8 @@ def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floa
         array = np.asarray(value, np.float64, "C")
     except (TypeError, ValueError):
         raise ArgumentError(argument, value, f"numbers of shape {shape}".replace("-1", "n")) from None
-    wanted = (len(array), *shape[1:]) if array.ndim and shape[:1] == (-1,) else shape
-    if array.shape != wanted:
+    many = shape[:1] == (-1,) and array.ndim == len(shape) and array.shape[1:] == shape[1:]
+    if array.shape != shape and not many:
         raise ArgumentError(f"{argument} of shape", array.shape, str(shape).replace("-1", "n"))
     return array
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -30,9 +31,10 @@ Floats = NDArray[np.float64]
 # The kernels that Python calls, always with a mechanism's blocks and contiguous float arrays (see `Entry`).
 entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
     configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
-    evaluation.all_finite, evaluation.biases, evaluation.centroidal_momentum, evaluation.displacements_along,
-    evaluation.energies_along, evaluation.impact_loss, evaluation.mass_matrices, evaluation.misplaced,
-    evaluation.poses_along, evaluation.rows_along, kinematics.forward_kinematics, kinematics.frame_jacobian)})
+    evaluation.all_finite, evaluation.bias_at, evaluation.biases_at, evaluation.centroidal_momentum,
+    evaluation.displacements_along, evaluation.energies_along, evaluation.impact_loss, evaluation.mass_matrices_at,
+    evaluation.mass_matrix_at, evaluation.misplaced_body, evaluation.poses_along, evaluation.rows_along,
+    kinematics.forward_kinematics, kinematics.frame_jacobian)})
 
 
 class _Scratch(threading.local):
@@ -132,12 +134,12 @@ class Mechanism:
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector coordinates."""
         out = np.empty(self.nq)
-        entries.integrate(self.block, self._places("q", q)[0], self._rates("v", v)[0], float(dt), out)
+        entries.integrate(self.block, self._place(q), self._rates(v), float(dt), out)
         return out
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest rotations."""
-        return self._filled((self.nv,), entries.difference, self._places("q0", q0)[0], self._places("q1", q1)[0])
+        return self._filled((self.nv,), entries.difference, self._place(q0, "q0"), self._place(q1, "q1"))
 
     def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """Return (R (n, 3, 3), p (n, 3) [m]): axes and origin of every body in the world."""
@@ -156,19 +158,37 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        return self._mass_matrices("q", q)[0]
+        out = np.empty((self.nv, self.nv))
+        if not self._mass_matrix_at(self._scratch.parts, float_array("q", q, (self.nq,)), out):
+            self._place(q)
+        return out
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
-        return self._mass_matrices("qs[{}]", qs)
+        places = float_array("qs", qs, (-1, self.nq))
+        out = np.empty((len(places), self.nv, self.nv))
+        if not entries.mass_matrices_at(self._scratch.parts, places, out):
+            self._check_states(places)
+        return out
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
-        return self._biases("q", q, "v", v)[0]
+        place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
+        out = np.empty(self.nv)
+        if not self._bias_at(self._scratch.parts, place, rates, out):
+            self._place(place)
+            self._rates(rates)
+        return out
 
     def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
-        return self._biases("qs[{}]", qs, "vs[{}]", vs)
+        places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
+        if len(places) != len(rates):
+            raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
+        out = np.empty(rates.shape)
+        if not entries.biases_at(self._scratch.parts, places, rates, out):
+            self._check_states(places, rates)
+        return out
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
@@ -176,7 +196,7 @@ class Mechanism:
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
         """Return tau = M dv + B + G (d,)."""
-        rates, change = self._rates("v", v)[0], self._rates("dv", dv)[0]
+        rates, change = self._rates(v), self._rates(dv, "dv")
         return self._filled((self.nv,), entries.inverse_dynamics, self._at(q), rates, change, _field(g))
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
@@ -194,12 +214,13 @@ class Mechanism:
 
         Body -1 is the world, which does not move.
         """
-        places, fixed_to = self._places("qs[{}]", qs), np.ascontiguousarray(bodies, np.int64)
+        places, fixed_to = float_array("qs", qs, (-1, self.nq)), np.ascontiguousarray(bodies, np.int64)
         spots, along = float_array("points", points, (-1, 3)), float_array("directions", directions, (-1, 3))
         if not len(places) == len(fixed_to) == len(spots) == len(along):
             raise ArgumentError("bodies, points and directions", len(spots), f"{len(places)} each, as many as qs")
         if len(fixed_to) and not -1 <= fixed_to.min() <= fixed_to.max() < len(self.names):
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
+        self._check_states(places)
         given = self._scratch.workspace, places, fixed_to, spots, along
         return self._filled((len(places), self.nv), entries.rows_along, *given)
 
@@ -212,11 +233,11 @@ class Mechanism:
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
         """Return the kinetic energy [J]."""
-        return float(self.energies(self._places("q", q), self._rates("v", v), np.zeros(3))[0][0])
+        return float(self.energies(self._place(q)[None], self._rates(v)[None], np.zeros(3))[0][0])
 
     def potential_energy(self, q: ArrayLike, g: ArrayLike) -> float:
         """Return -sum m g . c [J] of the bodies that can move, for the field g (3,) [m/s^2]."""
-        return float(self.energies(self._places("q", q), np.zeros((1, self.nv)), g)[1][0])
+        return float(self.energies(self._place(q)[None], np.zeros((1, self.nv)), g)[1][0])
 
     def displacements(self, qs: ArrayLike, straight: bool = False) -> Floats:
         """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations qs.
@@ -230,12 +251,12 @@ class Mechanism:
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return (6,): momentum [N s] and angular momentum [N m s] about the moving bodies' centre of mass."""
-        return self._filled((6,), entries.centroidal_momentum, self._at(q), self._rates("v", v)[0])
+        return self._filled((6,), entries.centroidal_momentum, self._at(q), self._rates(v))
 
     def _at(self, q: ArrayLike) -> Block:
         """Return this thread's scratch with the kinematics of q; the next call overwrites it."""
         workspace: Block = self._scratch.workspace
-        entries.forward_kinematics(self.block, self._places("q", q)[0], workspace)
+        entries.forward_kinematics(self.block, self._place(q), workspace)
         return workspace
 
     def _filled(self, shape: tuple[int, ...], kernel: Callable[..., None], *given: Any) -> Floats:
@@ -243,50 +264,35 @@ class Mechanism:
         kernel(self.block, *given, out)
         return out
 
-    def _mass_matrices(self, name: str, qs: ArrayLike) -> Floats:
-        places = _rows(name, qs, self.nq)
-        out = np.empty((len(places), self.nv, self.nv))
-        if not entries.mass_matrices(self._scratch.parts, places, out):
-            self._places(name, qs)
-        return out
+    @cached_property
+    def _mass_matrix_at(self) -> Callable[..., bool]:
+        return entries.mass_matrix_at.taking(self._scratch.parts, np.empty(self.nq), np.empty((self.nv, self.nv)))
 
-    def _biases(self, name: str, qs: ArrayLike, v_name: str, vs: ArrayLike) -> Floats:
-        places, rates = _rows(name, qs, self.nq), _rows(v_name, vs, self.nv)
-        if len(places) != len(rates):
-            raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
-        out = np.empty(rates.shape)
-        if not entries.biases(self._scratch.parts, places, rates, out):
-            self._places(name, qs)
-            self._rates(v_name, vs)
-        return out
+    @cached_property
+    def _bias_at(self) -> Callable[..., bool]:
+        return entries.bias_at.taking(self._scratch.parts, np.empty(self.nq), np.empty(self.nv), np.empty(self.nv))
 
-    def _rates(self, name: str, vs: ArrayLike) -> Floats:
-        """Return velocities as rows (see `_rows`); all must be finite."""
-        rates = _rows(name, vs, self.nv)
-        if not entries.all_finite(rates):
-            k = int(np.argmin(np.isfinite(rates).all(axis=1)))
-            raise ArgumentError(name.format(k), rates[k], "finite numbers")
-        return rates
+    def _rates(self, v: ArrayLike, name: str = "v") -> Floats:
+        """Return a velocity (nv,) of finite numbers, or raise ArgumentError."""
+        rates = float_array(name, v, (self.nv,))
+        return rates if entries.all_finite(rates) else finite_array(name, v, (self.nv,))
 
-    def _places(self, name: str, qs: ArrayLike) -> Floats:
-        """Return configurations as rows (see `_rows`); all must be finite, with quaternions of length one."""
-        places = _rows(name, qs, self.nq)
-        found = entries.misplaced(self.block, places)
-        if found >= 0:
-            k, b = divmod(found, len(self.bodies))
-            q = finite_array(name.format(k), places[k], (self.nq,))
+    def _place(self, q: ArrayLike, name: str = "q") -> Floats:
+        """Return a configuration (nq,) of finite numbers whose quaternions have length one, or raise ArgumentError."""
+        place = float_array(name, q, (self.nq,))
+        b = entries.misplaced_body(self.block, place)
+        if b >= 0:
+            finite_array(name, q, (self.nq,))
             first, units = int(self.arrays.q_start[b]), self.bodies[b].joint.layout.coordinate_units
             of_unit = [first + i for i, unit in enumerate(units) if unit == "1"]
-            where = f"{name.format(k)} of body {self.names[b]!r}"
-            raise ArgumentError(where, q[of_unit], "entries of total length one")
-        return places
+            raise ArgumentError(f"{name} of body {self.names[b]!r}", place[of_unit], "entries of total length one")
+        return place
 
-
-def _rows(name: str, given: ArrayLike, size: int) -> Floats:
-    """Return numbers as rows (n, size): one row of a vector named "q", any number of rows named "qs[{}]"."""
-    many = name.endswith("[{}]")
-    rows = float_array(name.removesuffix("[{}]"), given, (-1, size) if many else (size,))
-    return rows if many else rows[None]
+    def _check_states(self, places: Floats, rates: Floats | tuple[()] = ()) -> None:
+        for k, q in enumerate(places):
+            self._place(q, f"qs[{k}]")
+        for k, v in enumerate(rates):
+            self._rates(v, f"vs[{k}]")
 
 
 def _field(g: ArrayLike) -> Floats:

@@ -18,56 +18,64 @@ UNIT_TOLERANCE = 1e-6
 
 
 @kernel
-def all_finite(rows):
-    """Return whether an array (n, k) has no NaN and no infinity."""
-    for i in range(rows.shape[0]):
-        for k in range(rows.shape[1]):
-            if not isfinite(rows[i, k]):
-                return False
+def all_finite(values):
+    """Return whether a vector has no NaN and no infinity."""
+    for k in range(values.shape[0]):  # noqa: SIM110 - a kernel has no generators
+        if not isfinite(values[k]):
+            return False
     return True
 
 
 @kernel
-def misplaced(m, q):
-    """Return k · n + b for the first body b of n, in the first row k of q, that q cannot place; −1 if there is none.
-
-    An entry is not finite, or the length of a quaternion or (cos, sin) pair is not one.
-    """
-    n = m.kind.shape[0]
-    for k in range(q.shape[0]):
-        for b in range(n):
-            first = m.q_start[b]
-            stop = m.q_start[b + 1] if b + 1 < n else q.shape[1]
-            unit = first + 3 if m.kind[b] == FREE_FLYER else first
-            square = 0.0
-            for i in range(unit, stop):
-                square += q[k, i] * q[k, i]
-            if not (all_finite(q[k : k + 1, first:stop])
-                    and (is_vector(m.kind[b]) or abs(sqrt(square) - 1.0) <= UNIT_TOLERANCE)):
-                return k * n + b
+def misplaced_body(m, q):
+    """Return the first body with an entry that is not finite, or a quaternion or pair not of length one; −1: none."""
+    for b in range(m.kind.shape[0]):
+        first = m.q_start[b]
+        stop = m.q_start[b + 1] if b + 1 < m.kind.shape[0] else q.shape[0]
+        square = 0.0
+        for i in range(first + 3 if m.kind[b] == FREE_FLYER else first, stop):
+            square += q[i] * q[i]
+        if not (all_finite(q[first:stop]) and (is_vector(m.kind[b]) or abs(sqrt(square) - 1.0) <= UNIT_TOLERANCE)):
+            return b
     return -1
 
 
 @kernel
-def mass_matrices(at, q, out):
-    """out (n, d, d) <- M at each row of q (n, nq); return False if one is not a valid configuration."""
-    if misplaced(at.mechanism, q) >= 0:
+def mass_matrix_at(at, q, out):
+    """out (d, d) <- M(q); return False if q is not a valid configuration."""
+    if misplaced_body(at.mechanism, q) >= 0:
         return False
-    for k in range(q.shape[0]):
-        forward_kinematics(at.mechanism, q[k], at.workspace)
-        mass_matrix(at.mechanism, at.workspace, out[k])
+    forward_kinematics(at.mechanism, q, at.workspace)
+    mass_matrix(at.mechanism, at.workspace, out)
     return True
 
 
 @kernel
-def biases(at, q, v, out):
-    """out (n, d) <- B at each row of q (n, nq) and v (n, d); return False if one is not valid."""
-    if misplaced(at.mechanism, q) >= 0 or not all_finite(v):
+def bias_at(at, q, v, out):
+    """out (d,) <- B(q, v); return False if q is not a valid configuration or v not finite."""
+    if misplaced_body(at.mechanism, q) >= 0 or not all_finite(v):
         return False
-    for k in range(q.shape[0]):
-        forward_kinematics(at.mechanism, q[k], at.workspace)
-        bias(at.mechanism, at.workspace, v[k], out[k])
+    forward_kinematics(at.mechanism, q, at.workspace)
+    bias(at.mechanism, at.workspace, v, out)
     return True
+
+
+@kernel
+def mass_matrices_at(at, q, out):
+    """out (n, d, d) <- M at each row of q (n, nq); return False if one is not valid."""
+    valid = True
+    for k in range(q.shape[0]):
+        valid = valid and mass_matrix_at(at, q[k], out[k])
+    return valid
+
+
+@kernel
+def biases_at(at, q, v, out):
+    """out (n, d) <- B at each row of q (n, nq) and v (n, d); return False if one is not valid."""
+    valid = True
+    for k in range(q.shape[0]):
+        valid = valid and bias_at(at, q[k], v[k], out[k])
+    return valid
 
 
 @kernel
