@@ -7,9 +7,12 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import fields
 from pathlib import Path
+
+os.environ.setdefault("IAPB_COMPILE", "whole")
 
 from iapb.run import Run
 from iapb.scene import load_scene
