@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from iapb.advice.checks import check_scene as check_scene
     from iapb.advice.effects import Effect as Effect
     from iapb.advice.effects import decide_effects as decide_effects
+    from iapb.contact.impact import FrictionalImpact as FrictionalImpact
     from iapb.contact.impact import Impact as Impact
     from iapb.contact.impact import Impacts as Impacts
+    from iapb.contact.impact import resolve_frictional_impact as resolve_frictional_impact
     from iapb.contact.impact import resolve_impact as resolve_impact
     from iapb.contact.impact import resolve_impacts as resolve_impacts
-    from iapb.contact.impact_laws import FrictionalImpact as FrictionalImpact
-    from iapb.contact.impact_laws import resolve_frictional_impact as resolve_frictional_impact
     from iapb.errors import ArgumentError as ArgumentError
     from iapb.errors import IapbError as IapbError
     from iapb.errors import MissingDependencyError as MissingDependencyError
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 _HOME = {
     "iapb.advice.certificate": ("Certificate", "certify", "certify_impacts"),
     "iapb.advice.checks": ("check_scene",),
-    "iapb.contact.impact": ("Impact", "Impacts", "resolve_impact", "resolve_impacts"),
-    "iapb.contact.impact_laws": ("FrictionalImpact", "resolve_frictional_impact"),
+    "iapb.contact.impact": ("FrictionalImpact", "Impact", "Impacts", "resolve_frictional_impact", "resolve_impact",
+                            "resolve_impacts"),
     "iapb.advice.effects": ("Effect", "decide_effects"),
     "iapb.errors": (
         "ArgumentError",

@@ -114,23 +114,26 @@ def dot_of(a, b):
 
 
 @kernel
-def orthogonalize(rows, j, size, triangle):
-    """Make the first `size` entries of row j orthogonal to the orthonormal rows before; return what is left, squared.
+def add_multiple(vector, factor, row):
+    """Do vector += factor · row over the length of the vector."""
+    for k in range(vector.shape[0]):
+        vector[k] += factor * row[k]
 
-    Gram-Schmidt, twice: enough to be orthogonal to rounding (Kahan, in Parlett 1980). Column j of `triangle` receives
-    the parts along the rows before.
+
+@kernel
+def orthogonalize(row, basis, count, overlaps):
+    """Remove the first `count` rows of an orthonormal basis from `row`; write the overlaps; return |row|² that is left.
+
+    Gram-Schmidt, twice: enough to be orthogonal to rounding (Kahan, in Parlett 1980).
     """
-    for m in range(j):
-        triangle[m, j] = 0.0
+    for j in range(count):
+        overlaps[j] = 0.0
     for _ in range(2):
-        for m in range(j):
-            overlap = 0.0
-            for k in range(size):
-                overlap += rows[m, k] * rows[j, k]
-            triangle[m, j] += overlap
-            for k in range(size):
-                rows[j, k] -= overlap * rows[m, k]
-    return dot_of(rows[j], rows[j, :size])
+        for j in range(count):
+            overlap = dot_of(basis[j], row)
+            overlaps[j] += overlap
+            add_multiple(row, -overlap, basis[j])
+    return dot_of(row, row)
 
 
 # Cholesky's factor M = L Lᵀ and the substitutions with it

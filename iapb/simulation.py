@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import Entry, copy_into, kernel
 from iapb.compiling import compiling_told, to_stderr
-from iapb.contact.impact_methods import real_numbers
+from iapb.contact.impact import real_numbers
 from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.errors import ArgumentError, IapbError

@@ -350,8 +350,8 @@ def _blank_state(sizes: tuple[int, ...], capacity: int, rows: int, tangents: int
     bodies, trees, nq, d, largest_tree = sizes
     vectors = {name: np.zeros(d) for name in (
         "v", "penalty_force", "friction_force", "impulse", "stage_penalty", "stage_friction", "bias", "acceleration",
-        "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "target", "row")}
-    squares = {name: np.zeros((d, d)) for name in ("mass_matrix", "lower", "group_mass", "group_lower", "triangle")}
+        "start_v", "mean_v", "mean_acceleration", "group_v", "group_v_plus", "group_impulse", "row")}
+    squares = {name: np.zeros((d, d)) for name in ("mass_matrix", "lower", "group_mass", "group_lower")}
     return block(State(
         q=np.zeros(nq), body=make_workspace(bodies, d),
         contacts=make_contact_buffer(capacity), previous=make_contact_buffer(capacity),

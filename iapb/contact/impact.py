@@ -1,64 +1,56 @@
 """Resolve a simultaneous impact: equations (19)-(21), in the form that stays passive in floating point.
 
 With M = L Lᵀ, u = Lᵀ v and A = J L⁻ᵀ the paper's (21) is u⁺ = u − (1 + e) P u, P the orthogonal projector onto
-the row space of A. `factored` applies P through an orthonormal basis; `gram_pinv` evaluates the formula as printed.
+the row space of A, which is applied through an orthonormal basis. `verification.methods` has the formulas as printed.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.compiled import Entry, block
-from iapb.contact.impact_methods import (
-    Given,
-    ImpactInput,
-    Method,
-    Whitened,
-    as_given,
-    damped,
-    gram_cholesky,
-    gram_pinv,
-    outcome,
-    poisson,
-    refusal,
-    scaled,
-    stacked,
-    svd,
+from iapb.contact.kernels.resolve import (
+    LARGEST_ENTRY,
+    NOT_CONVERGED,
+    SYMMETRY_TOLERANCE,
+    Results,
+    make_resolve_work,
+    resolve_each,
 )
-from iapb.contact.kernels.border import make_border_work, whole_impact, whole_impacts
-from iapb.errors import ArgumentError, RangeError
+from iapb.errors import ArgumentError, IapbError, RangeError, SolverError
+from iapb.linalg import cholesky
 from iapb.names import one_of
 
 Floats = NDArray[np.float64]
-
-# To add a method, write its function in a new file and add a line here.
-METHODS: dict[str, Method] = {
-    "factored": Method(None, True),
-    "gram_pinv": Method(gram_pinv, False),
-    "gram_cholesky": Method(gram_cholesky, False),
-    "damped": Method(damped, True),
-    "svd": Method(svd, True),
-    "poisson": Method(poisson, True),
-}
+Arrays = tuple[Floats, Floats, Floats]  # M (n, d, d), J (n, c, d), v (n, d)
+METHODS = ("factored", "poisson")
+NEWTON, POISSON, COULOMB = "Newton, equality", "Poisson, two LCPs", "Newton, equality, with Coulomb friction"
+_STATUS = "complete", "budget", "cancelled", "reduced", "not solved"  # the kernel's codes
+_ENTRIES = {law: Entry(resolve_each) for law in (NEWTON, POISSON, COULOMB)}  # each compiles only what its law needs
+_ONE = "mass_matrix", "contact_jacobian", "velocity"
+_MANY = "mass_matrices", "contact_jacobians", "velocities"
+_DOUBLE = np.dtype(np.float64)
 
 
 @dataclass(frozen=True)
 class Impact:
-    """The result of an impact (SI units; d generalized velocities, c contacts).
+    """The result of an impact (SI units; d generalized velocities, c contacts, m tangents each).
+
+    The result of n impacts (`resolve_impacts`) has n of each quantity, along the first axis.
 
     Attributes
     ----------
     velocity : (d,) generalized velocity v⁺ after the impact [m/s, rad/s].
-    generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp [N s, N m s].
+    generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp [N s, N m s]; with friction Jᵀp + Tᵀp_t.
     impulses : (c,) p along the contact normals [N s]; a positive value pushes. With redundant rows p is not unique.
-        Poisson's law returns the non-negative p that it found; ``damped`` returns the p of least norm for rows scaled
-        by powers of two to similar size; the other methods return the p of least norm.
+        Poisson's law returns the non-negative p that it found; with friction p is non-negative if non-negative
+        impulses can produce the motion; else it is the p of least norm.
     rank : number of independent rows that were used; for Poisson's law, number of contacts that push.
     energy_change : KE⁺ − KE⁻ [J] of the rounded velocities, evaluated in double-double arithmetic.
     energy_interval : (lower, upper) [J], bounds of KE⁺ − KE⁻ in real arithmetic for the given M and v⁻ and the
@@ -66,23 +58,36 @@ class Impact:
     clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 = inactive.
     status : ``"complete"``; ``"budget"``: the row budget stopped the method early; ``"not solved"``: a contact still
         closes after Poisson's law, which nearly opposed rows can cause (the energy does not rise in this case either);
+        ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be none). p_t then maximizes the
+        dissipation within the friction limits of the frictionless impact. It stays in the friction cones, and
+        passivity and restitution still hold.
         ``"cancelled"``: no change of velocity without an energy gain was found, so v⁺ = v⁻, or the entries of v differ
         by more than 2^1000 in size, so that scaling rounded the smallest.
-    method, law : the method that computed the impact, and its restitution law.
+    method, law : the method that computed the impact, and its impact law.
     rows_used : the row budget used (None = unlimited); the same budget reproduces the result exactly.
+    tangential_impulses : (c, m) p_t [N s], |p_t| ≤ μ p at every contact that pushes, zero at the others; m = 0 without
+        friction.
+    friction_share : factor in [0, 1] that scales friction so that the impact gains no energy and, with status
+        ``"reduced"``, every contact stays in its friction cone; 1 = friction is not reduced.
     """
 
     velocity: Floats
     generalized_impulse: Floats
     impulses: Floats
-    rank: int
-    energy_change: float
-    energy_interval: tuple[float, float]
-    clamp: float
-    status: str
+    rank: Any
+    energy_change: Any
+    energy_interval: Any
+    clamp: Any
+    status: Any
     method: str
     law: str
-    rows_used: int | None = field(default=None)
+    rows_used: int | None
+    tangential_impulses: Floats
+    friction_share: Any
+
+
+Impacts = Impact  # of many impacts
+FrictionalImpact = Impact
 
 
 def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike,
@@ -102,13 +107,10 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     restitution : e in [−1, 1] for all contacts; or (c,) values in [0, 1], one per contact. Unequal values use
         Poisson's law by two LCPs (compression, then restitution; contacts only push), which is passive for
         any such values. Equal values use the scalar rule.
-    method : ``factored`` (default, passive in floating point), ``gram_pinv`` (the paper's (20)-(21) as
-        printed), ``gram_cholesky`` (independent rows only), ``damped`` (W + λI)⁻¹, ``svd`` (truncated), ``poisson``
-        (contacts only push). All others take every row as an equality. ``poisson`` equals Newton's LCP if every row
-        approaches and e is one number in [0, 1].
+    method : ``factored`` (default), every row an equality; or ``poisson``, contacts only push, e in [0, 1]. It equals
+        Newton's LCP if every row approaches and e is one number.
     budget : largest number of rows used, the most violated first (``factored`` only). Every budget is passive.
-    clamp : whether to scale Δv so that rounding cannot raise the energy, in real arithmetic. Default: on for
-        ``factored``, ``damped``, ``svd`` and Poisson's law, off for the two ``gram`` methods.
+    clamp : whether to scale Δv so that rounding cannot raise the energy, in real arithmetic. Default: True.
     rank_tolerance : a row closer than this to the span of the rows used (unit rows, kinetic metric) is not used.
         Default: 1e-10, or 8 d ε κ(L), the rounding of the rows, where this is larger.
 
@@ -119,8 +121,7 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     Raises
     ------
     ArgumentError
-        Wrong shape, NaN or infinity, M not symmetric positive definite, e outside its range, dependent rows
-        with ``gram_cholesky``.
+        Wrong shape, NaN or infinity, M not symmetric positive definite, e outside its range.
     RangeError
         The result would overflow.
 
@@ -132,87 +133,22 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     accepted only if a computed bound proves this for the given M (`iapb.contact.kernels.passive`).
     Source: Constantinescu, Salcudean, Croft (2005), section V.
     """
-    given = as_given(mass_matrix, contact_jacobian, velocity, restitution)
-    solve, clamped_by_default = _method(method)
-    if method == "poisson" and given.unequal is None:
-        if given.restitution < 0.0:
-            raise ArgumentError("restitution", given.restitution, "a number in [0, 1] with method 'poisson'")
-        given = given._replace(unequal=np.full(len(given.contact_jacobian), given.restitution))
-    _check_options(method, budget, rank_tolerance, given.unequal is None)
-    clamped = clamped_by_default if clamp is None else _checked_clamp(clamp)
-    limit = _limit(budget, len(given.velocity))
-    rows_used = None if budget is None else int(budget)
-    law = "Newton, equality"
-    if given.unequal is not None:
-        solve, law, clamped = poisson, "Poisson, two LCPs", clamp is None or bool(clamp)
-    elif solve is None or not len(given.contact_jacobian):
-        return _factored(given, rank_tolerance, limit, clamped, method, rows_used)
-    problem = scaled(given)
-    answer = solve(problem, limit, clamped, rank_tolerance)
-    return _as_impact(problem, answer, clamped, method=method, law=law, rows_used=rows_used)
-
-
-# The texts of the kernel's status codes.
-_STATUS = ("complete", "budget", "cancelled")
-
-
-def _factored(given: Given, tolerance: float | None, limit: int, clamped: bool, method: str,
-              rows_used: int | None) -> Impact:
-    """Check, scale and resolve by (21) through an orthonormal basis of A's row space, in one compiled call."""
-    M, J, v, e, _ = given
-    d, c = len(v), len(J)
-    v_plus, momentum, impulses = np.empty(d), np.empty(d), np.empty(c)
-    wrong, (rank, status), factor, (change, lower, upper) = _entries()[0](
-        M, J, v, e, 0.0 if tolerance is None else float(tolerance), limit, clamped, _scratch(d, c), v_plus, momentum,
-        impulses)
-    if wrong[0]:
-        raise refusal(wrong, given, method=method)
-    return Impact(v_plus, momentum, impulses, rank, change, (lower, upper), factor, _STATUS[status], method,
-                  "Newton, equality", rows_used)
-
-
-@lru_cache(maxsize=8)
-def _scratch(coordinates: int, contacts: int) -> Any:
-    """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while it runs."""
-    return block(make_border_work(coordinates, contacts))
-
-
-@lru_cache(maxsize=1)
-def _entries() -> tuple[Any, Any]:
-    """Return the compiled functions for one impact and for many; calls skip numba's look-up of types."""
-    work, e, count = block(make_border_work(1, 1)), np.zeros(1), np.zeros((1, 2), np.int64)
-    flat, deep = np.zeros((1, 1)), np.zeros((1, 1, 1))
-    one = Entry(whole_impact).taking(flat, flat, e, 0.0, 0.0, 1, True, work, e, e, e)
-    many = Entry(whole_impacts).taking(deep, deep, flat, e, 0.0, 1, True, work, flat, flat, flat, count, flat)
-    return one, many
-
-
-@dataclass(frozen=True)
-class Impacts:
-    """The results of n impacts of d coordinates and c contacts: the attributes of `Impact`, one row per impact.
-
-    Attributes
-    ----------
-    velocity, generalized_impulse : (n, d).
-    impulses : (n, c).
-    rank, energy_change, clamp : (n,).
-    energy_interval : (n, 2).
-    status : (n,) texts.
-    """
-
-    velocity: Floats
-    generalized_impulse: Floats
-    impulses: Floats
-    rank: NDArray[np.int64]
-    energy_change: Floats
-    energy_interval: Floats
-    clamp: Floats
-    status: NDArray[np.str_]
+    arrays = _checked(_ONE, mass_matrix, contact_jacobian, velocity)
+    c = arrays[1].shape[1]
+    e = _coefficients("restitution", restitution, c, "contact", -1.0)
+    if not isinstance(method, str) or method not in METHODS:
+        raise ArgumentError("method", method, one_of(method, METHODS))
+    one_for_all = method == "factored" and bool((e == e.flat[:1]).all())
+    options = _options(budget, clamp, rank_tolerance, one_for_all)
+    if one_for_all:
+        return _resolve(arrays, e.reshape(-1)[:1] if e.size else np.zeros(1), NEWTON, options)
+    unequal = np.full((1, c), _coefficients("restitution", restitution, c, "contact", 0.0))
+    return _resolve(arrays, np.zeros(1), POISSON, options, method=method, unequal=unequal)
 
 
 def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: ArrayLike,
                     restitution: ArrayLike, *, budget: int | None = None, clamp: bool | None = None,
-                    rank_tolerance: float | None = None) -> Impacts:
+                    rank_tolerance: float | None = None) -> Impact:
     """Resolve n impacts of equal size in one call, bit for bit as `resolve_impact` with ``factored`` resolves each.
 
     Parameters
@@ -225,7 +161,7 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
 
     Returns
     -------
-    Impacts
+    Impact
         Velocities after the impacts (n, d), generalized impulses (n, d), impulses of the contacts (n, c), and the other
         attributes of `Impact` for each.
 
@@ -235,60 +171,198 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
         As `resolve_impact`, for the first invalid impact. The index in the argument's name begins with the number of
         this impact: ``mass_matrices[17, 0, 0]``.
     """
-    M, J, v, e = stacked(mass_matrices, contact_jacobians, velocities, restitution)
-    _check_options("factored", budget, rank_tolerance, True)
-    clamped = clamp is None or _checked_clamp(clamp)
-    n, c, d = J.shape
-    v_plus, momentum, impulses = np.empty((n, d)), np.empty((n, d)), np.empty((n, c))
-    counts, numbers = np.empty((n, 2), np.int64), np.empty((n, 4))
-    wrong, at = _entries()[1](
-        M, J, v, e, 0.0 if rank_tolerance is None else float(rank_tolerance), _limit(budget, d), clamped,
-        _scratch(d, c), v_plus, momentum, impulses, counts, numbers)
-    if wrong[0]:
-        raise refusal(wrong, Given(M[at], J[at], v[at], float(e[at]), None), (at,))
-    return Impacts(v_plus, momentum, impulses, counts[:, 0], numbers[:, 1], numbers[:, 2:], numbers[:, 0],
-                   np.array(_STATUS)[counts[:, 1]])
+    arrays = _checked(_MANY, mass_matrices, contact_jacobians, velocities)
+    n = len(arrays[0])
+    e = np.full(n, _coefficients("restitution", restitution, n, "impact", -1.0))
+    return _resolve(arrays, e, NEWTON, _options(budget, clamp, rank_tolerance, True), many=True)
 
 
-def _method(method: Any) -> tuple[Any, bool]:
-    if not isinstance(method, str) or method not in METHODS:
-        raise ArgumentError("method", method, one_of(method, METHODS))
-    return METHODS[method]
+def resolve_frictional_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, tangents: ArrayLike,
+                              velocity: ArrayLike, restitution: float, friction: ArrayLike) -> Impact:
+    """Resolve a simultaneous impact with restitution e and Coulomb friction μ, without energy gain.
+
+    Parameters
+    ----------
+    mass_matrix : (d, d) symmetric positive definite M.
+    contact_jacobian : (c, d) J, unit-normal rows; every row is an equality J v⁺ = −e J v⁻ (see `resolve_impact`).
+    tangents : (c, d) or (c, m, d), m = 1 (planar) or 2 (spatial): rows T of the unit tangents of each contact.
+    velocity : (d,) v⁻.
+    restitution : e in [0, 1], one for all contacts.
+    friction : μ ≥ 0, one or (c,).
+
+    Returns
+    -------
+    Impact
+        v⁺ (d,) [m/s | rad/s], normal and tangential impulses [N s], energy change [J].
+
+    Raises
+    ------
+    ArgumentError, RangeError
+        As `resolve_impact`; also for tangents or friction of the wrong shape or range.
+
+    Notes
+    -----
+    Sources: Coulomb's law at velocity level is from Moreau (1988). Kane and Levinson (Dynamics, 1985) found the energy
+    gain that this method prevents. The splitting into normal and tangential part is new here. At redundant contacts the
+    normal impulses that limit friction are not unique. The method takes non-negative impulses near those of least norm,
+    or those of least norm if some contact must pull. Both depend continuously on p_t, so the limits converge
+    (`iapb.contact.kernels.impact_friction`).
+    """
+    if np.ndim(restitution) != 0:
+        raise ArgumentError("restitution", restitution, "one number for all contacts")
+    arrays = _checked(_ONE, mass_matrix, contact_jacobian, velocity)
+    c, d = arrays[1].shape[1:]
+    e = _coefficients("restitution", restitution, c, "contact", 0.0)
+    mu = np.full((1, c), _coefficients("friction", friction, c, "contact", 0.0, np.finfo(float).max))
+    T = _array("tangents", tangents, 2 if np.ndim(tangents) == 2 else 3) if c or np.size(tangents) else np.zeros((0, d))
+    T = T[:, None] if T.ndim == 2 else T
+    if len(T) != c or T.shape[1] not in (1, 2) or T.shape[2] != d:
+        raise ArgumentError("tangents", np.shape(tangents), f"shape ({c}, {d}) or ({c}, 1 or 2, {d})")
+    if not np.isfinite(T).all():
+        raise ArgumentError("tangents", "a number that is not finite", "finite numbers")
+    along = np.ascontiguousarray(T).reshape(1, -1, d)
+    return _resolve(arrays, e.reshape(1), COULOMB, (None, True, 0.0), tangents=along, friction=mu,
+                    directions=T.shape[1])
 
 
-def _limit(budget: int | None, coordinates: int) -> int:
-    """Return the largest number of rows to use, as an integer that fits the kernel."""
-    return coordinates if budget is None else min(int(budget), np.iinfo(np.int64).max)
+def _resolve(arrays: Arrays, restitution: Floats, law: str,
+             options: tuple[int | None, bool, float], *, method: str = "factored", unequal: Floats | None = None,
+             tangents: Floats | None = None, friction: Floats | None = None, directions: int = 0,
+             many: bool = False) -> Impact:
+    """Resolve n impacts in one compiled call; return the first, or all if there are many."""
+    (n, c, d), (budget, clamped, tolerance) = arrays[1].shape, options
+    out = Results(np.empty((n, d)), np.empty((n, d)), np.empty((n, c)), np.empty((n, c * directions)),
+                  np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty((n, 3)))
+    limit = d if budget is None else min(budget, np.iinfo(np.int64).max)
+    done = _ENTRIES[law](*arrays, restitution, unequal, tangents, friction, tolerance, limit, clamped,
+                         _scratch(d, c, directions), out)
+    if done < n:
+        raise diagnose(*arrays, out, done, many)
+    along = out.tangential.reshape(n, c, directions)
+    if many:
+        return Impact(*out[:3], out.rank, out.energy[:, 0], out.energy[:, 1:], out.clamp,
+                      np.array(_STATUS)[out.status], method, law, budget, along, out.friction_share)
+    change, low, high = out.energy[0].tolist()
+    return Impact(out.velocity[0], out.generalized_impulse[0], out.impulses[0], int(out.rank[0]), change, (low, high),
+                  float(out.clamp[0]), _STATUS[out.status[0]], method, law, budget, along[0],
+                  float(out.friction_share[0]))
 
 
-def _checked_clamp(clamp: Any) -> bool:
-    if not isinstance(clamp, bool | np.bool_):
-        raise ArgumentError("clamp", clamp, "True, False or None")
-    return bool(clamp)
+@lru_cache(maxsize=8)
+def _scratch(coordinates: int, contacts: int, tangents: int) -> Any:
+    """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while it runs."""
+    return block(make_resolve_work(coordinates, contacts, tangents))
 
 
-def _check_options(method: str, budget: Any, tolerance: Any, equal: bool) -> None:
+def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: bool) -> IapbError:
+    """Return the error that explains why the kernel refused one of n impacts, given as arrays (n, ...).
+
+    It names the first wrong entry of M, v or J, else the result that is out of range.
+    """
+    names, lead = (_MANY, (refused,)) if many else (_ONE, ())
+    M, J, v = M[refused], J[refused], v[refused]
+
+    def named(name: str, *place: Any) -> str:
+        return f"{name}[{', '.join(map(str, (*lead, *place)))}]" if lead or place else name
+
+    for name, array in zip((names[0], names[2], names[1]), (M, v, J), strict=True):
+        for place in np.argwhere(~np.isfinite(array))[:1]:
+            return ArgumentError(named(name, *place), float(array[tuple(place)]), "a finite number")
+    k = int(np.argmin(np.diag(M)))
+    if not M[k, k] > 0.0:
+        return ArgumentError(named(names[0], k, k), float(M[k, k]), "a positive diagonal entry")
+    exponents = -(np.frexp(np.diag(M))[1] // 2)
+    with np.errstate(over="ignore"):
+        scaled = np.ldexp(M, exponents[:, None] + exponents)
+    i, j = np.unravel_index(np.argmax(np.abs(scaled)), M.shape)
+    if not abs(scaled[i, j]) <= LARGEST_ENTRY:
+        return ArgumentError(named(names[0], i, j), float(M[i, j]), "a positive definite matrix")
+    i, j = np.unravel_index(np.argmax(np.abs(scaled - scaled.T)), M.shape)
+    if abs(scaled[i, j] - scaled[j, i]) > SYMMETRY_TOLERANCE:
+        return ArgumentError(named(names[0], i, j), float(M[i, j]),
+                             f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}")
+    lower = 0.5 * (scaled + scaled.T)
+    if pivot := cholesky(lower, lower):
+        expected = f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)"
+        return ArgumentError(named(names[0]), M, expected)
+    if out.status[refused] == NOT_CONVERGED:
+        return SolverError(f"Poisson's law: the active-set method did not converge on {len(J)} contacts")
+    quantities = names[2], "generalized_impulse", "impulses", "tangential_impulses"
+    for quantity, values in zip(quantities, out, strict=False):
+        if not np.isfinite(values[refused]).all():
+            return RangeError(named(quantity), "the impact of these magnitudes is above 1.8e308")
+    return RangeError(named("energy_change"), "the kinetic energy of these magnitudes is above 1.8e308")
+
+
+def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, velocity: Any) -> Arrays:
+    """Return contiguous doubles; n = 1 unless the names are those of many impacts."""
+    many = names is _MANY
+    M, v = _array(names[0], mass_matrix, 2 + many), _array(names[2], velocity, 1 + many)
+    lead, d = v.shape[:many], M.shape[-1]
+    if d == 0 or M.shape != (*lead, d, d):
+        each = " for each line of velocities" if many else ""
+        raise ArgumentError(names[0], M.shape, f"a square matrix with at least one row{each}")
+    if v.shape[-1] != d:
+        raise ArgumentError(names[2], v.shape, f"{d} entries, one per row of {names[0]}")
+    rows = jacobian if type(jacobian) is np.ndarray else real_numbers(jacobian)
+    empty = rows is not None and rows.shape == (0,)  # [] has no second dimension to check
+    J = np.zeros((*lead, 0, d)) if empty else _array(names[1], jacobian, 2 + many)
+    if J.shape[:many] != lead or J.shape[-1] != d:
+        raise ArgumentError(names[1], J.shape, f"shape ({', '.join(map(str, (*lead, 'contacts', d)))})")
+    return (M, J, v) if many else (M[None], J[None], v[None])
+
+
+def real_numbers(value: Any) -> NDArray[Any] | None:
+    """Return the value as an array; None for strings, truth values, time spans, complex numbers and masked arrays."""
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):
+        return None
+    if isinstance(value, np.ma.MaskedArray):
+        return None
+    if given.dtype.kind == "O":
+        return given if all(isinstance(x, Real) and not isinstance(x, bool) for x in given.flat) else None
+    return given if given.dtype.kind in "fiu" else None
+
+
+def _array(name: str, value: Any, dimensions: int) -> Floats:
+    """Return a contiguous array of doubles, without a check that they are finite."""
+    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.ndim == dimensions and value.flags.carray:
+        return value
+    given = real_numbers(value)
+    if given is None:
+        raise ArgumentError(name, value, "an array of real numbers")
+    try:
+        array = given.astype(np.float64, copy=False)
+    except OverflowError:
+        raise ArgumentError(name, value, "an array of finite numbers") from None
+    if array.ndim != dimensions:
+        raise ArgumentError(name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}")
+    return np.require(array, requirements=["C", "A", "W"])
+
+
+def _coefficients(name: str, value: Any, size: int, each: str, low: float, high: float = 1.0) -> Floats:
+    """Return one number, or one for each of `size` contacts or impacts, between low and high."""
+    given = real_numbers(value)
+    if given is None or given.shape not in ((), (size,)):
+        raise ArgumentError(name, value, f"a real number or shape ({size},), one per {each}")
+    numbers = given.astype(np.float64)
+    for i in np.flatnonzero(~((numbers >= low) & (numbers <= high)))[:1]:
+        raise ArgumentError(f"{name}[{i}]" if numbers.ndim else name, float(numbers.flat[i]),
+                            f"a number in [{low:g}, 1]" if high == 1.0 else "a finite number >= 0")
+    return numbers
+
+
+def _options(budget: Any, clamp: Any, tolerance: Any, can_stop: bool) -> tuple[int | None, bool, float]:
+    """Return row budget, whether to clamp, and rank tolerance, 0 for the default."""
     if budget is not None:
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 0:
             raise ArgumentError("budget", budget, "a whole number of rows, 0 or more")
-        if method != "factored" or not equal:
+        if not can_stop:
             raise ArgumentError("budget", budget, "None: only 'factored', with one restitution for all, can stop early")
+    if clamp is not None and not isinstance(clamp, bool | np.bool_):
+        raise ArgumentError("clamp", clamp, "True, False or None")
     number = isinstance(tolerance, float | int | np.floating)
     if tolerance is not None and not (number and 0.0 < tolerance < 1.0):
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")
-
-
-def _as_impact(problem: ImpactInput, answer: Whitened, clamped: bool, *, method: str, law: str,
-               rows_used: int | None) -> Impact:
-    """Undo the power-of-two scaling and report the energy change of the returned velocity."""
-    found = outcome(problem, answer.v_plus, answer.momentum, answer.impulses, clamped)
-    for quantity, array in (("velocity", found.velocity), ("generalized_impulse", found.momentum),
-                            ("impulses", found.impulses)):
-        if not np.isfinite(array).all():
-            raise RangeError(quantity, f"the {method} impact of these magnitudes is above 1.8e308")
-    if not math.isfinite(found.energy_change):
-        raise RangeError("energy_change", "the kinetic energy of these magnitudes is above 1.8e308")
-    clamp = answer.clamp * found.factor
-    status = "cancelled" if clamp == 0.0 or problem.underflows and problem.contacts else answer.status
-    return Impact(found.velocity, found.momentum, found.impulses, answer.rank, found.energy_change,
-                  found.energy_interval, clamp, status, method, law, rows_used)
+    return None if budget is None else int(budget), clamp is None or bool(clamp), float(tolerance or 0.0)

@@ -7,7 +7,7 @@ forces while it lasts. `Penalty` applies penalty forces alone: the same algorith
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -47,18 +47,11 @@ class StepResult(NamedTuple):
 
 def copied_step(system: Any, state: State) -> StepResult:
     """Return copies of the results of the step that `state` has just made."""
-    return StepResult(
-        q=state.q.copy(), v=state.v.copy(), penalty_force=state.penalty_force.copy(),
-        friction_force=state.friction_force.copy(), impulse=state.impulse.copy(),
-        state=_contact_state(state.state_of_tree, system.tool_tree),
-    )
-
-
-def _contact_state(states: NDArray[np.int8], tool_tree: int) -> int:
-    """Python version of `iapb.contact.kernels.step.contact_state`; it avoids numba's look-up of types."""
-    if tool_tree >= 0:
-        return int(states[tool_tree])
-    return next((state for state in (COLLIDING, RESTING) if state in states), FREE)
+    states, tool = state.state_of_tree, system.tool_tree
+    # As the kernel `contact_state` does, without numba's look-up of types.
+    told = states[tool] if tool >= 0 else next((each for each in (COLLIDING, RESTING) if each in states), FREE)
+    return StepResult(state.q.copy(), state.v.copy(), state.penalty_force.copy(), state.friction_force.copy(),
+                      state.impulse.copy(), int(told))
 
 
 class ContactLaw(Protocol):
@@ -108,6 +101,12 @@ class _EngineLaw:
     def within(self, scene: Any) -> Self:
         """Return the law with the scene's choices where it leaves them open."""
         return self if self.integrator else replace(self, integrator=scene.own_integrator)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of the law; `pushing` only if it is True."""
+        settings = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in settings.items() if name != "pushing" or value}
 
     @classmethod
     def runs_compiled(cls) -> bool:
@@ -164,14 +163,7 @@ class ImpulseAugmented(_EngineLaw):
     @property
     def uses(self) -> frozenset[str]:
         """Parts of the scene that the law uses."""
-        return EVERYTHING - ({IMPACT_FRICTION} if not self.friction_in_impacts else set()) | {JOINTS}
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Integrator, rendering, and whether friction acts in impacts; `pushing` only if it is True."""
-        settings = {"integrator": self.integrator, "rendering": self.rendering,
-                    "friction_in_impacts": self.friction_in_impacts}
-        return settings | ({"pushing": True} if self.pushing else {})
+        return (EVERYTHING if self.friction_in_impacts else EVERYTHING - {IMPACT_FRICTION}) | {JOINTS}
 
 
 @dataclass(frozen=True)
@@ -184,14 +176,6 @@ class Penalty(_EngineLaw):
     rendering = "full"
     uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS})  # the record says which contacts are new
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Integrator."""
-        return {"integrator": self.integrator}
 
-
-ENGINE_LAWS: dict[str, ContactLaw] = {
-    law.name: law for law in (
-        ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), ImpulseAugmented(pushing=True), Penalty(),
-    )
-}
+_LAWS = ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), ImpulseAugmented(pushing=True), Penalty()
+ENGINE_LAWS: dict[str, ContactLaw] = {law.name: law for law in _LAWS}

@@ -1,6 +1,6 @@
 """Compare IAPB's extensions with complementarity: friction in the impact, and unequal restitution.
 
-Friction: the engine's law (`iapb.contact.impact_laws`) is compared with Coulomb's law as a nonlinear complementarity
+Friction: the engine's law (`resolve_frictional_impact`) is compared with Coulomb's law as a nonlinear complementarity
 problem (NCP) and with the convex relaxation of this problem (CCP). If all contacts push and the engine did not reduce
 friction, the engine and the NCP give the same velocity. With e > 0 the NCP can gain energy; the engine cannot.
 
@@ -19,8 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb import resolve_impact
-from iapb.contact.impact_laws import FrictionalImpact, resolve_frictional_impact
+from iapb import FrictionalImpact, resolve_frictional_impact, resolve_impact
 from iapb.errors import SolverError
 from reference.complementarity.laws import (
     LAWS,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from iapb.linalg import cholesky, from_whitened, to_whitened
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 from verification.impacts import ImpactCase
+from verification.methods import gram_pinv
 
 PRINTED = "printed formula (numpy)"
 Floats = NDArray[Any]
@@ -30,20 +32,14 @@ def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float =
     return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), restitution, rank=rank)
 
 
-def engine_call(case: ImpactCase, method: str, budget: int | None = None) -> Call:
-    """Return a call of `resolve_impact` with a method; it includes the checks of the arguments."""
-    return lambda: resolve_impact(*case.arrays, case.restitution, method=method, budget=budget).velocity
+def engine_call(case: ImpactCase) -> Call:
+    """Return a call of `resolve_impact`; it includes the checks of the arguments."""
+    return lambda: resolve_impact(*case.arrays, case.restitution).velocity
 
 
 def printed_call(case: ImpactCase) -> Call:
     """Return a call of formula (21) as printed, in numpy."""
-    mass, rows, v = case.arrays
-
-    def call() -> Floats:
-        solved = np.linalg.solve(mass, rows.T)
-        return v - (1.0 + case.restitution) * (solved @ (np.linalg.pinv(rows @ solved) @ (rows @ v)))
-
-    return call
+    return partial(gram_pinv, *case.arrays, case.restitution)
 
 
 @kernel

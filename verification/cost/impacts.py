@@ -62,7 +62,7 @@ WAYS: tuple[Way, ...] = (
     *(Way(SWEEPS, f"{sweeps} sweep{'s' * (sweeps > 1)}", COMPILED, partial(SweepsCall, sweeps=sweeps))
       for sweeps in REPEATED),
     Way(LEMKE, "all pivots", COMPILED, LemkeCall),
-    Way(CALLED, "all rows", PYTHON, partial(engine_call, method="factored")),
+    Way(CALLED, "all rows", PYTHON, engine_call),
     Way(PRINTED, "as printed", PYTHON, printed_call),
     Way(QP, "active set", PYTHON, DaqpCall),
 )

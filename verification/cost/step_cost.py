@@ -165,7 +165,7 @@ def _warm(
     case: ImpactCase, solvers: Sequence[str], too_slow: dict[tuple[str, str], float], failures: list[Failure] | None
 ) -> tuple[dict[str, Call], dict[str, Floats], dict[str, str]]:
     """Return the calls that work, their v⁺, and the reasons why the other calls fail."""
-    calls: dict[str, Call] = {KERNEL: KernelCall(case), IAPB: engine_call(case, "factored"),
+    calls: dict[str, Call] = {KERNEL: KernelCall(case), IAPB: engine_call(case),
                               PRINTED: printed_call(case)}  # fmt: skip
     answers, notes = {name: call() for name, call in calls.items()}, dict[str, str]()
     for name in (LEMKE_KERNEL, *solvers):

@@ -205,8 +205,8 @@ class HardCaseVerdict:
     forward_error : impacts: |v⁺ − truth| / |v⁻| in the kinetic metric; trajectories: relative distance from the law.
     forward_bound : error that the conditioning or the time step may cause.
     smallest_fault : for a stable verdict, the smallest relative fault in the answer that changes the verdict.
-    rank, exact_rank : rank that the method used, and rank of the exact Jacobian; trajectories: the largest rank of an
-        impact, and None.
+    rank, exact_rank : rank that the method used, None if it does not say, and rank of the exact Jacobian; trajectories:
+        the largest rank of an impact, and None.
     clamp : factor of the energy clamp.
     seconds : median time of one call, or of one step [s].
     """
@@ -220,7 +220,7 @@ class HardCaseVerdict:
     restitution_residual: float = _NONE
     forward_error: float = _NONE
     forward_bound: float = _NONE
-    rank: int = 0
+    rank: int | None = 0
     exact_rank: int | None = 0
     clamp: float = _NONE
     seconds: float = _NONE

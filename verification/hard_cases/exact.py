@@ -3,8 +3,8 @@
 Poisson's law: both LCPs are solved by trying every set of pushing contacts. Friction: a tangential impulse α p_t is
 added to Newton's normal impact; it changes no normal velocity. p_t sticks, or has size μ p_n against the slip after the
 impact. α is the largest factor in [0, 1] without a gain of energy. It is rational except for one square root, which
-ball arithmetic encloses. Sources: Kane and Levinson (1985) for the gain of energy; `iapb.contact.impact_laws` for the
-split of the impulse.
+ball arithmetic encloses. Sources: Kane and Levinson (1985) for the gain of energy; the module
+`iapb.contact.kernels.impact_friction` for the split of the impulse.
 """
 
 from __future__ import annotations

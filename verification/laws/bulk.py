@@ -19,6 +19,7 @@ from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
 from verification.impacts import ImpactCase
 from verification.laws.impact_laws import restitution_residual
+from verification.methods import COMPARED
 
 Floats = NDArray[Any]
 
@@ -140,7 +141,7 @@ def bulk_impacts(
     Parameters
     ----------
     impacts, seed : number of impacts, and seed of the random numbers.
-    method, clamp : arguments of `iapb.resolve_impact`.
+    method, clamp : "factored", with or without the clamp of `iapb.resolve_impact`, or a name of `COMPARED`.
     largest_condition : κ(M) is log-uniform up to it.
     progress : called with (done, impacts) after each batch.
 
@@ -165,8 +166,11 @@ def bulk_impacts(
 
 
 def _resolve(batch: _Batch, method: str, clamp: bool | None) -> tuple[Floats, Floats]:
-    """v⁺ (n, d) and rank (n,)."""
-    found = [resolve_impact(*case.arrays, case.restitution, method=method, clamp=clamp) for case in batch.cases]
+    """v⁺ (n, d) and rank (n,), NaN if the method does not say."""
+    if method != "factored":
+        velocities = [COMPARED[method](*case.arrays, case.restitution) for case in batch.cases]
+        return np.array(velocities), np.full(len(velocities), np.nan)
+    found = [resolve_impact(*case.arrays, case.restitution, clamp=clamp) for case in batch.cases]
     return np.array([impact.velocity for impact in found]), np.array([float(impact.rank) for impact in found])
 
 

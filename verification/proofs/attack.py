@@ -151,9 +151,9 @@ def one_by_one(resolve: Callable[[Floats, Floats, Floats, float], Floats]) -> Bu
     return in_bulk
 
 
-def engine_resolver(method: str = "factored", clamp: bool | None = None) -> BulkResolver:
+def engine_resolver(clamp: bool | None = None) -> BulkResolver:
     """Return the engine's public `resolve_impact` as a bulk resolver: one call per impact (about 10⁴ per second)."""
-    return one_by_one(lambda m, j, v, e: resolve_impact(m, j, v, e, method=method, clamp=clamp).velocity)
+    return one_by_one(lambda m, j, v, e: resolve_impact(m, j, v, e, clamp=clamp).velocity)
 
 
 def factored_in_bulk(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: Floats) -> Floats:

@@ -216,13 +216,11 @@ def resolve_rows(world, state, size, count):
     if world.switches.impact_friction:
         span = rank
         if unequal and solved:  # Poisson's law needs no basis of the rows, friction does
-            span = orthonormal_basis(work.columns[:size], count, work.u[:size], rank_tolerance(lower), size,
-                                     work.basis, work.closing, work.size, work.overlap)
+            span = orthonormal_basis(size, count, rank_tolerance(lower), size, work)
         friction_share, factor, met = add_friction_to_impact(world, state, size, count, span)
         return rank, clamp * factor, friction_share, solved and met
     if not (unequal and solved):
-        minimum_norm_impulses(work.rows, work.length, count, work.basis, rank, work.change[:size],
-                              state.row_impulse, work.columns, state.triangle, state.target)
+        minimum_norm_impulses(size, count, rank, work.length, work.change[:size], state.row_impulse, work)
     return rank, clamp, friction_share, solved
 
 

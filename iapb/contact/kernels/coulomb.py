@@ -10,7 +10,7 @@ keeps the work of friction over the step from being positive.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import moving_tree
 from iapb.contact.kernels.impact_friction import slide, tangent_inertia
 from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
-from iapb.linalg import add, dot, dot_of, load, scale, solve_tree_blocks, store
+from iapb.linalg import add, add_multiple, dot, dot_of, load, scale, solve_tree_blocks, store
 from iapb.mechanics.kernels.kinematics import add_point_force
 
 SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, and the next step goes on from there
@@ -43,11 +43,8 @@ class StepFriction(NamedTuple):
 def make_step_friction(coordinates: int, contacts: int, tangents: int, tree_size: int) -> StepFriction:
     """Allocate the scratch; `tree_size`: coordinates of the largest tree."""
     c, m, width = contacts, tangents, 2 * tree_size
-    return StepFriction(
-        contact=np.zeros(c, np.int64), tree=np.zeros((c, 2), np.int64), rows=np.zeros((c * m, width)),
-        slip=np.zeros(c * m), p=np.zeros(c * m), radius=np.zeros(c), inertia=np.zeros(c),
-        moved=np.zeros(coordinates), local=np.zeros(width), velocity=np.zeros(m),
-    )  # fmt: skip
+    shapes: tuple[Any, ...] = ((c * m, width), c * m, c * m, c, c, coordinates, width, m)
+    return StepFriction(np.zeros(c, np.int64), np.zeros((c, 2), np.int64), *map(np.zeros, shapes))
 
 
 @kernel
@@ -173,37 +170,28 @@ def _start(world, state, count):
     f, size = state.step_friction, state.step_friction.velocity.shape[0]
     f.moved[:] = 0.0
     for r in range(count):
-        _fetch(world, f, r)
+        _carry(world, f, r, False)
         for j in range(r * size, (r + 1) * size):
-            for k in range(f.local.shape[0]):
-                f.local[k] += f.p[j] * f.rows[j, k]
-        _give_back(world, f, r)
+            add_multiple(f.local, f.p[j], f.rows[j])
+        _carry(world, f, r, True)
     if dot_of(f.p[: count * size], f.slip[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
         f.p[: count * size] = 0.0
         f.moved[:] = 0.0
 
 
 @kernel
-def _fetch(world, f, r):
-    """local ← the entries of `moved` for the trees of contact r."""
-    width = f.local.shape[0] // 2
-    f.local[:] = 0.0
+def _carry(world, f, r, back):
+    """Copy the entries of `moved` for the trees of contact r to `local`, or back."""
+    if not back:
+        f.local[:] = 0.0
     for side in range(2):
-        tree = f.tree[r, side]
+        tree, width = f.tree[r, side], f.local.shape[0] // 2
         if tree >= 0:
-            for k in range(world.tree_start[tree], world.tree_stop[tree]):
-                f.local[side * width + k - world.tree_start[tree]] = f.moved[k]
-
-
-@kernel
-def _give_back(world, f, r):
-    """Write `local` back to the entries of `moved` for the trees of contact r."""
-    width = f.local.shape[0] // 2
-    for side in range(2):
-        tree = f.tree[r, side]
-        if tree >= 0:
-            for k in range(world.tree_start[tree], world.tree_stop[tree]):
-                f.moved[k] = f.local[side * width + k - world.tree_start[tree]]
+            for k in range(world.tree_stop[tree] - world.tree_start[tree]):
+                if back:
+                    f.moved[world.tree_start[tree] + k] = f.local[side * width + k]
+                else:
+                    f.local[side * width + k] = f.moved[world.tree_start[tree] + k]
 
 
 @kernel
@@ -217,9 +205,9 @@ def _sweep(world, state, count):
         fastest = 0.0
         for r in range(count):
             if f.inertia[r] > 0.0:
-                _fetch(world, f, r)
+                _carry(world, f, r, False)
                 moves = slide(f.rows, f.slip, f.radius[r], f.inertia[r], f.p, f.local, f.velocity, r * size)
-                _give_back(world, f, r)
+                _carry(world, f, r, True)
                 fastest = max(fastest, moves)
         if fastest <= still:
             break

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.passive import clamped_step, plainly_loses, write_step
-from iapb.contact.kernels.projector import orthonormal_basis, projected_change, unit_columns
+from iapb.contact.kernels.projector import orthonormal_basis, projected_change
 from iapb.double_double import add_product, symmetric_entry
-from iapb.linalg import from_whitened, to_momentum, to_whitened, whiten_columns
+from iapb.linalg import add_multiple, dot_of, from_whitened, to_momentum, to_whitened, whiten_columns
 
 UNIT_ROUNDOFF = 2.0**-53
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. The error of
@@ -28,12 +28,14 @@ class ImpactWork(NamedTuple):
     rows: np.ndarray  # (d, c) unit rows of A as columns, kept for impulses
     length: np.ndarray  # (c,) lengths of the rows of A
     basis: np.ndarray  # (d, d) rows are the orthonormal basis Q
+    triangle: np.ndarray  # (d, d) T of the impulses of least norm
     closing: np.ndarray  # (c,)
     size: np.ndarray  # (c,)
     overlap: np.ndarray  # (c,)
     u: np.ndarray  # (d,) whitened velocity
     change: np.ndarray  # (d,) Δu; after an impact L⁻¹ of the generalized impulse
     v_change: np.ndarray  # (d,) Δv
+    target: np.ndarray  # (d,)
     deviation: np.ndarray  # (d,)
     along: np.ndarray  # (d,)
     shifted: np.ndarray  # (d,)
@@ -42,9 +44,8 @@ class ImpactWork(NamedTuple):
 def make_impact_work(coordinates: int, contacts: int) -> ImpactWork:
     """Allocate the scratch for up to `contacts` rows on `coordinates` generalized velocities."""
     d, c = coordinates, contacts
-    wide, long, short = (d, c), (c,), (d,)
-    return ImpactWork(np.zeros(wide), np.zeros(wide), np.zeros(long), np.zeros((d, d)), np.zeros(long),
-                      np.zeros(long), np.zeros(long), *(np.zeros(short) for _ in range(6)))
+    shapes: tuple[Any, ...] = ((d, c), (d, c), c, (d, d), (d, d), c, c, c, d, d, d, d, d, d, d)
+    return ImpactWork(*map(np.zeros, shapes))
 
 
 @kernel
@@ -61,13 +62,19 @@ def rank_tolerance(lower):
 @kernel
 def whiten_impact(lower, v, count, work):
     """Write unit rows of A (`work.columns`, `work.rows`), their lengths and u, from v and J in `work.columns`."""
-    d = v.shape[0]
-    columns = work.columns[:d]
-    to_whitened(lower, v, work.u[:d])
+    d, columns, length = v.shape[0], work.columns, work.length
+    to_whitened(lower, v, work.u)
     whiten_columns(lower, columns, count)
-    unit_columns(columns, count, work.length)
+    length[:count] = 0.0
     for k in range(d):
         for i in range(count):
+            length[i] += columns[k, i] * columns[k, i]
+    for i in range(count):
+        length[i] = math.sqrt(length[i])
+    for k in range(d):
+        for i in range(count):
+            if length[i] > 0.0:  # rows of zeros stay
+                columns[k, i] /= length[i]
             work.rows[k, i] = columns[k, i]
 
 
@@ -87,42 +94,21 @@ def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget
 def project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
     """Do the part of `factored_impact` that follows `whiten_impact`."""
     d = v.shape[0]
-    columns, u, change = work.columns[:d], work.u[:d], work.change[:d]
-    rank = orthonormal_basis(columns, count, u, tolerance, budget, work.basis, work.closing, work.size,
-                             work.overlap)
-    projected_change(work.basis, rank, u, 1.0 + restitution, change)
-    clamp = apply_projected_change(mass_matrix, lower, v, rank, clamped, work, v_plus, momentum)
-    return rank, clamp
-
-
-@kernel
-def apply_projected_change(mass_matrix, lower, v, rank, clamped, work, v_plus, momentum):
-    """Do `apply_change` for a Δu in the span of the basis; with the clamp, `refine_change` corrects Δu first."""
-    d = v.shape[0]
-    from_whitened(lower, work.change[:d], work.v_change[:d])
+    rank = orthonormal_basis(d, count, tolerance, budget, work)
+    projected_change(work.basis, rank, work.u[:d], 1.0 + restitution, work.change[:d])
+    from_whitened(lower, work.change[:d], work.v_change)
     if clamped:
-        refine_change(mass_matrix, lower, work.basis, rank, work.change[:d], work.v_change[:d], work.deviation[:d],
-                      work.along[:d], work.shifted[:d])
-    return _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum)
+        refine_change(mass_matrix, lower, d, rank, work)
+    return rank, apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum)
 
 
 @kernel
 def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
-    """Write v⁺ = v + α L⁻ᵀ Δu and the generalized impulse α L Δu; return the clamp's α."""
-    d = v.shape[0]
-    from_whitened(lower, work.change[:d], work.v_change[:d])
-    return _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum)
-
-
-@kernel
-def _clamp_and_apply(mass_matrix, lower, v, clamped, work, v_plus, momentum):
-    """Write v⁺ = v + α Δv and the generalized impulse α L change, where M Δv = L change; return α.
+    """Write v⁺ = v + α Δv and the generalized impulse α L Δu of `work`, where M Δv = L Δu (9); return α.
 
     With the clamp, v⁺ has no more kinetic energy than v in real arithmetic; α = 0 if no other α is found.
     """
-    d = v.shape[0]
-    alpha = 1.0
-    moved = False
+    d, alpha, moved = v.shape[0], 1.0, False
     for k in range(d):
         moved = moved or work.v_change[k] != 0.0
     write_step(v, work.v_change, alpha, v_plus)
@@ -143,63 +129,37 @@ _PASSES = 3  # each multiplies the remaining error by |E|, about d ε κ(M): 1e-
 
 
 @kernel
-def refine_change(mass_matrix, lower, basis, rank, change, v_change, deviation, along, shifted):
-    """Correct Δu = change of (21) for M instead of L Lᵀ.
+def refine_change(mass_matrix, lower, d, rank, work):
+    """Correct Δu = work.change of (21), in the span of the basis, and Δv = work.v_change for M instead of L Lᵀ.
 
     In whitened coordinates M is I + E with |E| about d ε κ(M). The corrected Δu has the given part in the row space
     (restitution), and its impulse (I + E) Δu lies in the row space. The iteration is Δu ← Δu₀ − (I − Q Qᵀ) E Δu, with
     E Δu = L⁻¹ M Δv − Δu and M Δv summed in double-double. Without it the clamp alone would compensate E, which
-    reduces restitution.
-
-    change : (d,) Δu₀ in span Q; on return L⁻¹ of the generalized impulse.
-    v_change : (d,) L⁻ᵀ Δu₀; on return Δv.  deviation, along, shifted : (≥d,) scratch.
+    reduces restitution. On return work.change is L⁻¹ of the generalized impulse.
     """
-    d = change.shape[0]
-    size = 0.0
+    change, deviation, inside, shifted = work.change[:d], work.deviation[:d], work.along[:d], work.shifted[:d]
     for k in range(d):
-        shifted[k] = change[k]
-        along[k] = 0.0
-        size += change[k] * change[k]
+        shifted[k], inside[k] = change[k], 0.0
+    size = dot_of(change, change)
     for _ in range(_PASSES):
-        felt = math.sqrt(_deviation(mass_matrix, lower, v_change, shifted, deviation) / size) if size > 0.0 else 0.0
+        for i in range(d):
+            high = low = 0.0
+            for j in range(d):
+                entry, rest = symmetric_entry(mass_matrix, i, j)
+                high, low = add_product(high, low, entry, rest, work.v_change[j])
+            total = high + low
+            for j in range(i):
+                total -= lower[i, j] * (deviation[j] + shifted[j])
+            deviation[i] = total / lower[i, i] - shifted[i]
+        felt = math.sqrt(dot_of(deviation, deviation) / size) if size > 0.0 else 0.0
         if not _FELT < felt < _CONTRACTS:
             break
-        _split(basis, rank, deviation, along)
+        inside[:] = 0.0
+        for j in range(rank):
+            overlap = dot_of(work.basis[j], deviation)
+            add_multiple(inside, overlap, work.basis[j])
+            add_multiple(deviation, -overlap, work.basis[j])
         for k in range(d):
             shifted[k] = change[k] - deviation[k]
-        from_whitened(lower, shifted[:d], v_change)
-    for k in range(d):
-        change[k] += along[k]
-
-
-@kernel
-def _deviation(mass_matrix, lower, v_change, shifted, deviation):
-    """Write E Δu = L⁻¹ M Δv − Δu; return its square."""
-    d = v_change.shape[0]
-    square = 0.0
-    for i in range(d):
-        high = low = 0.0
-        for j in range(d):
-            entry, rest = symmetric_entry(mass_matrix, i, j)
-            high, low = add_product(high, low, entry, rest, v_change[j])
-        total = high + low
-        for j in range(i):
-            total -= lower[i, j] * (deviation[j] + shifted[j])
-        deviation[i] = total / lower[i, i] - shifted[i]
-        square += deviation[i] * deviation[i]
-    return square
-
-
-@kernel
-def _split(basis, rank, deviation, along):
-    """Move the part of `deviation` in the span of the basis to `along`."""
-    d = deviation.shape[0]
-    for k in range(d):
-        along[k] = 0.0
-    for j in range(rank):
-        overlap = 0.0
-        for k in range(d):
-            overlap += basis[j, k] * deviation[k]
-        for k in range(d):
-            along[k] += overlap * basis[j, k]
-            deviation[k] -= overlap * basis[j, k]
+        from_whitened(lower, shifted, work.v_change)
+    add_multiple(change, 1.0, inside)

@@ -1,22 +1,32 @@
-"""Dry friction in an impact, as stated in `iapb.contact.impact_laws`: on plain arrays, linear in the contacts.
+"""Dry friction in an impact: an extension of (15)-(21) that the paper leaves to future work. Linear in the contacts.
 
-The normal part is computed before; its `ImpactWork` holds u, the change Δ_n and the basis Q of the normal rows. These
-kernels add Δ_t = α Bᵀ p_t with B = A_t (I − Q Qᵀ), which changes no normal velocity.
+With u = Lᵀ v, rows A_n = J L⁻ᵀ and A_t = T L⁻ᵀ and P = Q Qᵀ the projector onto A_n's rows, the change of velocity is
+split into two orthogonal parts,
+
+    Δu = −(1 + e) P u  +  α Bᵀ p_t,      B = A_t (I − P).
+
+The first is the paper's impulse; its `ImpactWork` holds u, the change Δ_n and the basis Q. The second, which these
+kernels add, is a tangential impulse *together with the normal impulse that keeps every normal velocity at −e γ⁻*.
+Restitution is therefore met exactly, whatever the friction. p_t obeys Coulomb's law with the tangential velocity after
+the impact: stick, or slip with |p_t| = μ p_n against the velocity. α ≤ 1 is the largest factor for which the impact
+gains no energy. By orthogonality ΔKE(α) = −½(1−e²)|P u|² + α u·Bᵀp_t + ½ α² |Bᵀp_t|²; if ΔKE(1) > 0, α is the positive
+root of ΔKE. This excludes the energy gain that Kane and Levinson found for Newton's law with friction. If ΔKE(1) ≤ 0,
+then α = 1 and the impact obeys Coulomb's law.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.compiled import kernel
+from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import apply_change
-from iapb.contact.kernels.projector import add_minimum_norm, minimum_norm_factors, subtract_pushed
+from iapb.contact.kernels.projector import add_minimum_norm, minimum_norm_factors
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
-from iapb.linalg import dot_of
+from iapb.linalg import add_multiple, dot_of, from_whitened, orthogonalize
 
 GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 
@@ -45,13 +55,8 @@ class FrictionWork(NamedTuple):
 def make_friction_work(coordinates: int, contacts: int, tangents: int) -> FrictionWork:
     """Allocate the scratch for up to `contacts` contacts with `tangents` directions each."""
     d, c, m = coordinates, contacts, tangents
-    per_contact = {name: np.zeros(c) for name in (
-        "inertia", "coefficient", "radius", "change", "sliding", "without", "wanted")}
-    per_coordinate = {name: np.zeros(d) for name in ("target", "left", "moved")}
-    return FrictionWork(
-        free=np.zeros((c * m, d)), normal_part=np.zeros((c * m, d)), slip=np.zeros(c * m), p=np.zeros(c * m),
-        response=np.zeros(c * m), velocity=np.zeros(m), **per_contact, **per_coordinate,
-    )
+    shapes: tuple[Any, ...] = ((c * m, d), (c * m, d), c * m, c * m, c, c * m, c, c, c, c, c, c, d, d, d, m)
+    return FrictionWork(*map(np.zeros, shapes))
 
 
 @kernel
@@ -59,35 +64,27 @@ def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impul
     """Add Coulomb friction to the normal impact in `work`; `f.free` holds the tangents' rows of J, `f.coefficient` μ.
 
     Writes v⁺, the generalized impulse, the normal impulses (count,) and the tangential ones, `f.p`; returns (share of
-    friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, also before convergence.
+    friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, also before convergence. The share is α
+    times a factor that keeps p_t within the friction cones if no p_t obeys Coulomb's law.
     """
-    d = v.shape[0]
-    share, met = friction_change(lower, count, rank, work, push, f, d)
-    clamp = apply_change(mass_matrix, lower, v, True, work, v_plus, momentum)
-    for i in range(count):
-        impulses[i] = clamp * (f.without[i] + share * (f.wanted[i] - f.without[i]))
-    for j in range(count * f.velocity.shape[0]):
-        f.p[j] *= clamp * share
-    return share, clamp, met
-
-
-@kernel
-def friction_change(lower, count, rank, work, push, f, d):
-    """Add α Bᵀ p_t to `work.change`; return the share of p_t that is kept and whether Coulomb's law is met.
-
-    The share is α times a factor that keeps p_t within the friction cones if no p_t obeys Coulomb's law.
-    """
+    d, p = v.shape[0], f.p[: count * f.velocity.shape[0]]
     u, change, moved = work.u[:d], work.change[:d], f.moved[:d]
     scale = split_tangents(lower, count, rank, work, f, d)
     met = settle_friction(count, rank, work, push, f, d, scale)
-    within = share_within_cone(count, f)
-    combine(f.free[:, :d], f.p[: count * f.velocity.shape[0]], moved)
+    share = share_within_cone(count, f)
+    combine(f.free, p, moved)
     for k in range(d):
-        moved[k] *= within
+        moved[k] *= share
     alpha = passive_share(u, change, moved)
-    for k in range(d):
-        change[k] += alpha * moved[k]
-    return alpha * within, met
+    share *= alpha
+    add_multiple(change, alpha, moved)
+    from_whitened(lower, change, work.v_change)
+    clamp = apply_change(mass_matrix, lower, v, True, work, v_plus, momentum)
+    for i in range(count):
+        impulses[i] = clamp * (f.without[i] + share * (f.wanted[i] - f.without[i]))
+    for j in range(p.shape[0]):
+        p[j] *= clamp * share
+    return share, clamp, met
 
 
 @kernel
@@ -98,24 +95,13 @@ def split_tangents(lower, count, rank, work, f, d):
     """
     u, largest = work.u[:d], 0.0
     for j in range(count * f.velocity.shape[0]):
-        row = f.free[j, :d]
-        slip = before = left = 0.0
+        row, slip = f.free[j, :d], 0.0
         for k in range(d):  # L x = row
             row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
             slip += row[k] * (u[k] + work.change[k])
-            before += row[k] * row[k]
-        f.slip[j] = slip
+        f.slip[j], before = slip, dot_of(row, row)
         largest = max(largest, before)
-        f.normal_part[j, :rank] = 0.0
-        for _ in range(2):  # twice is enough to be orthogonal to rounding (Kahan, in Parlett 1980)
-            for i in range(rank):
-                overlap = dot_of(work.basis[i], row)
-                f.normal_part[j, i] += overlap
-                for k in range(d):
-                    row[k] -= overlap * work.basis[i, k]
-        for k in range(d):
-            left += row[k] * row[k]
-        if left <= GONE * GONE * before:
+        if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
     return math.sqrt(largest) * math.sqrt(dot_of(u, u))
 
@@ -181,24 +167,25 @@ def settle_friction(count, rank, work, push, f, d, scale):
     If it is not, p_t maximizes the dissipation under the limits of the frictionless impact, a convex problem.
     scale : speed [m/s] to which STILL and MET are relative.
     """
-    for i in range(count):
-        f.inertia[i] = tangent_inertia(f.free[:, :d], i * f.velocity.shape[0], f.velocity.shape[0])
-    f.p[: count * f.velocity.shape[0]] = 0.0
-    pushes = _start(count, rank, work, push, f, d)
-    if pushes and _settle(count, rank, work, push, f, d, scale, True):
-        _trim(count, rank, work, push, f, True)
-        return True
-    if pushes:  # did not converge: continue as if contacts pull
-        _least_norm_start(count, rank, work, push, f)
-    if _settle(count, rank, work, push, f, d, scale, False):
-        _trim(count, rank, work, push, f, False)
-        return True
     size = f.velocity.shape[0]
     for i in range(count):
+        f.inertia[i] = tangent_inertia(f.free[:, :d], i * size, size)
+    f.p[: count * size] = 0.0
+    if _start(count, rank, work, push, f, d) and _settle(count, rank, work, f, d, scale, True):
+        _trim(count, rank, work, f, True)
+        return True
+    f.p[: count * size] = 0.0
+    _move_normals(count, rank, work, f, False)
+    for i in range(count):
+        f.without[i], f.radius[i] = f.wanted[i], 0.0
+        f.sliding[i] = f.coefficient[i] if f.without[i] > 0.0 else 0.0  # contacts that pull get no friction
+    if _settle(count, rank, work, f, d, scale, False):
+        _trim(count, rank, work, f, False)
+        return True
+    for i in range(count):
         f.radius[i] = f.sliding[i] * max(f.without[i], 0.0)
-    friction_sweeps(f.free[: count * size, :d], f.slip, f.radius[:count], f.inertia, f.p[: count * size], f.moved[:d],
-                    f.velocity, HELD_SWEEPS, STILL * scale)
-    _move_normals(count, rank, work, push, f, False)
+    friction_sweeps(count, d, f, HELD_SWEEPS, STILL * scale)
+    _move_normals(count, rank, work, f, False)
     return False
 
 
@@ -217,37 +204,29 @@ def tangent_inertia(free, first, size):
 @kernel
 def _start(count, rank, work, push, f, d):
     """Factor the normal rows and write the impulses without friction; return whether non-negative ones exist."""
-    change, left = work.change[:d], f.left[:d]
+    change, left, size = work.change[:d], f.left[:d], f.velocity.shape[0]
     length = math.sqrt(dot_of(change, change))
     for k in range(d):
         f.moved[k] = -change[k] / length if length > 0.0 else 0.0
     pushes = push_only(work.rows, count, f.moved[:d], f.without, left, push)
     pushes = pushes and dot_of(left, left) <= PUSHES * PUSHES
-    minimum_norm_factors(work.rows, work.length, count, d, work.basis, rank, work.columns, push.triangle)
+    minimum_norm_factors(d, count, rank, work.length, work)
     for j in range(rank):
         f.target[j] = dot_of(work.basis[j], change)
-    _responses(count, rank, work, push, f)
-    if not pushes:
-        _least_norm_start(count, rank, work, push, f)
-        return False
-    for i in range(count):
-        f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
-        f.wanted[i] = f.without[i]
-        f.sliding[i], f.radius[i] = f.coefficient[i], 0.0
-    _spread(count, rank, work, push, f)
-    return True
-
-
-@kernel
-def _responses(count, rank, work, push, f):
-    """Write ∂p_n,i / ∂p_t,i of each tangent: the change of a contact's normal impulse with its own friction."""
-    size = f.velocity.shape[0]
-    for j in range(count * size):
+    for j in range(count * size):  # ∂p_n,i / ∂p_t,i: the change of a contact's normal impulse with its own friction
         for i in range(rank):
             f.left[i] = -f.normal_part[j, i]
         f.wanted[:count] = 0.0
-        add_minimum_norm(count, rank, f.left, work.columns, push.triangle, f.wanted)
+        add_minimum_norm(count, rank, f.left, f.wanted, work)
         f.response[j] = f.wanted[j // size]
+    if not pushes:
+        return False
+    for i in range(count):
+        f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
+        f.sliding[i], f.radius[i] = f.coefficient[i], 0.0
+    f.wanted[:count] = 0.0  # start from impulses of least norm: an active set loads only a few of redundant contacts
+    _move_normals(count, rank, work, f, True)
+    return True
 
 
 @kernel
@@ -262,58 +241,39 @@ def _stride(f, i, size):
 
 
 @kernel
-def _spread(count, rank, work, push, f):
-    """Start from least-norm impulses, since an active set loads only a few of many redundant contacts."""
-    f.wanted[:count] = 0.0
-    _move_normals(count, rank, work, push, f, True)
-
-
-@kernel
-def _least_norm_start(count, rank, work, push, f):
-    """Write least-norm impulses without friction; contacts that pull get no friction."""
-    f.p[: count * f.velocity.shape[0]] = 0.0
-    _move_normals(count, rank, work, push, f, False)
-    for i in range(count):
-        f.without[i], f.radius[i] = f.wanted[i], 0.0
-        f.sliding[i] = f.coefficient[i] if f.without[i] > 0.0 else 0.0
-
-
-@kernel
-def _move_normals(count, rank, work, push, f, near):
-    """Move `f.wanted` to normal impulses consistent with p_t: the nearest ones (`near`), or those of least norm.
-
-    Returns the distance of the old impulses from consistency [√J].
-    """
-    left, defect = f.left, 0.0
-    for i in range(rank):
-        left[i] = f.target[i]
+def _move_normals(count, rank, work, f, near):
+    """Move `f.wanted` to the nearest normal impulses consistent with p_t, or those of least norm; return the defect."""
+    left, defect = f.left[:rank], 0.0
+    copy_into(left, f.target)
     for j in range(count * f.velocity.shape[0]):
         if f.p[j] != 0.0:
-            for i in range(rank):
-                left[i] -= f.normal_part[j, i] * f.p[j]
+            add_multiple(left, -f.p[j], f.normal_part[j])
     if near:
-        subtract_pushed(count, rank, f.wanted, work.columns, push.triangle, f.moved, left)
-        defect = math.sqrt(dot_of(left[:rank], left[:rank]))
+        for j in range(rank):  # left −= Bᵀ p = Tᵀ Vᵀ p
+            f.moved[j] = dot_of(work.columns[j], f.wanted[:count])
+            for m in range(j + 1):
+                left[j] -= work.triangle[m, j] * f.moved[m]
+        defect = math.sqrt(dot_of(left, left))
     else:
         f.wanted[:count] = 0.0
-    add_minimum_norm(count, rank, left, work.columns, push.triangle, f.wanted)
+    add_minimum_norm(count, rank, left, f.wanted, work)
     return defect
 
 
 @kernel
-def _settle(count, rank, work, push, f, d, scale, pushes):
+def _settle(count, rank, work, f, d, scale, pushes):
     """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET times the scale."""
     size, speed = f.velocity.shape[0], math.sqrt(dot_of(work.u[:d], work.u[:d]))
     moved = math.inf
     for done in range(ROUNDS):
-        defect = _move_normals(count, rank, work, push, f, pushes)
+        defect = _move_normals(count, rank, work, f, pushes)
         step = 1.0 if done < UNDAMPED else (HALF if done < HALVED else FIFTH)
         for i in range(count):
             if pushes:
                 f.wanted[i] = max(f.wanted[i], 0.0)
             f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.radius[i]
             f.radius[i] = max(0.0, f.radius[i] + step * _stride(f, i, size) * f.change[i])
-        moved = _sweep_tangents(f, count, size, d, STILL * scale)
+        moved = _sweep_tangents(count, d, f, STILL * scale)
         if speed > 0.0:
             moved = max(moved, scale * (defect / speed))
         if moved <= STILL * scale:
@@ -322,29 +282,26 @@ def _settle(count, rank, work, push, f, d, scale, pushes):
 
 
 @kernel
-def _sweep_tangents(f, count, size, d, still):
-    """Sweep p_t; return the largest change of velocity [m/s] by the first sweep or by a limit that holds p_t.
-
-    A limit counts with its full change, before damping.
-    """
-    p, rows, radius = f.p[: count * size], f.free[: count * size, :d], f.radius[:count]
-    moved = friction_sweeps(rows, f.slip, radius, f.inertia, p, f.moved[:d], f.velocity, 1, 0.0)
+def _sweep_tangents(count, d, f, still):
+    """Sweep p_t; return the largest change of velocity by the first sweep, or by an undamped limit that holds p_t."""
+    size = f.velocity.shape[0]
+    moved = friction_sweeps(count, d, f, 1, 0.0)
     if moved > still:
-        friction_sweeps(rows, f.slip, radius, f.inertia, p, f.moved[:d], f.velocity, SWEEPS - 1, SETTLED * moved)
+        friction_sweeps(count, d, f, SWEEPS - 1, SETTLED * moved)
     for i in range(count):
-        own = p[i * size : (i + 1) * size]
+        own = f.p[i * size : (i + 1) * size]
         length, change = math.sqrt(dot_of(own, own)), abs(f.change[i])
-        if length >= radius[i] - STRIDE * change:
+        if length >= f.radius[i] - STRIDE * change:
             moved = max(moved, f.inertia[i] * min(change, length))
     return moved
 
 
 @kernel
-def _trim(count, rank, work, push, f, near):
+def _trim(count, rank, work, f, near):
     """Shorten each contact's p_t that the last round left outside its cone, and update the normal impulses."""
     size = f.velocity.shape[0]
     for _ in range(TRIMS):
-        _move_normals(count, rank, work, push, f, near)
+        _move_normals(count, rank, work, f, near)
         within = True
         for i in range(count):
             own, limit = f.p[i * size : (i + 1) * size], f.sliding[i] * max(f.wanted[i], 0.0)
@@ -356,7 +313,7 @@ def _trim(count, rank, work, push, f, near):
         if within:
             break
     else:
-        _move_normals(count, rank, work, push, f, near)
+        _move_normals(count, rank, work, f, near)
     largest = 0.0
     for i in range(count):
         largest = max(largest, f.wanted[i])
@@ -372,23 +329,19 @@ SINGULAR = 1e-12
 
 
 @kernel
-def friction_sweeps(free, slip, radius, inertia, p, moved, velocity, sweeps, still):
+def friction_sweeps(count, d, f, sweeps, still):
     """Sweep over the contacts: set p_i so that w_i = 0 if its disc allows this, else to proj(p_i − w_i / ρ_i).
 
     w = slip + B Bᵀ p is the tangential velocity, proj projects on the disc of radius radius_i; p changes in place.
-
-    free : (k m, d) rows B: tangential impulses change u by Bᵀ p and keep the normal velocities
-    slip : (k m,) tangential velocity without friction; radius : (k,) μ p_n; inertia : (k,) ρ ≥ ‖B_i B_iᵀ‖
-    moved : (d,) scratch for Bᵀ p, so that a sweep is linear in the contacts; velocity : (m,) scratch.
     Stops after a sweep that changes no velocity by more than `still`; returns the largest change of the last one [m/s].
     """
-    count, size, fastest = radius.shape[0], velocity.shape[0], 0.0
+    size, free, moved, fastest = f.velocity.shape[0], f.free[:, :d], f.moved[:d], 0.0
     for _ in range(sweeps):
-        combine(free, p, moved)  # anew in every sweep: rounding does not add up
+        combine(f.free, f.p[: count * size], moved)  # anew in every sweep: rounding does not add up
         fastest = 0.0
         for i in range(count):
-            if inertia[i] > 0.0:
-                fastest = max(fastest, slide(free, slip, radius[i], inertia[i], p, moved, velocity, i * size))
+            if f.inertia[i] > 0.0:
+                fastest = max(fastest, slide(free, f.slip, f.radius[i], f.inertia[i], f.p, moved, f.velocity, i * size))
         if fastest <= still:
             break
     return fastest
@@ -396,12 +349,10 @@ def friction_sweeps(free, slip, radius, inertia, p, moved, velocity, sweeps, sti
 
 @kernel
 def combine(rows, weight, out):
-    """Write out (d,) = rowsᵀ weight."""
-    for k in range(out.shape[0]):
-        out[k] = 0.0
+    """Write out (d,) = rowsᵀ weight; longer rows are cut."""
+    out[:] = 0.0
     for j in range(weight.shape[0]):
-        for k in range(out.shape[0]):
-            out[k] += weight[j] * rows[j, k]
+        add_multiple(out, weight[j], rows[j])
 
 
 @kernel
@@ -412,11 +363,9 @@ def slide(free, slip, radius, inertia, p, moved, velocity, first):
         velocity[a] = slip[first + a] + dot_of(free[first + a], moved)
     fastest = math.sqrt(dot_of(velocity, velocity))
     if not _stops(free, radius, p, velocity, first):
-        square = 0.0
         for a in range(size):
             velocity[a] = p[first + a] - velocity[a] / inertia
-            square += velocity[a] * velocity[a]
-        length = math.sqrt(square)
+        length = math.sqrt(dot_of(velocity, velocity))
         share = radius / length if length > radius else 1.0
         for a in range(size):
             velocity[a] *= share
@@ -426,18 +375,14 @@ def slide(free, slip, radius, inertia, p, moved, velocity, first):
     for a in range(size):
         change = velocity[a] - p[first + a]
         p[first + a] += change
-        for k in range(moved.shape[0]):
-            moved[k] += change * free[first + a, k]
+        add_multiple(moved, change, free[first + a])
     return fastest
 
 
 @kernel
 def _stops(free, radius, p, velocity, first):
-    """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds the limit.
-
-    Steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps to reach this impulse; with a lever these are hundreds.
-    """
-    if velocity.shape[0] != 2:
+    """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds the limit."""
+    if velocity.shape[0] != 2:  # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
         return False
     x, y = free[first], free[first + 1]
     xx, yy, xy = dot_of(x, x), dot_of(y, y), dot_of(x, y)

@@ -166,9 +166,7 @@ def gain_enclosure(mass_matrix, v, w):
     high, low, radius, underflow = gain(mass_matrix, v, w)
     radius += underflow
     upper = high + (low + radius)
-    if math.isfinite(upper) and 3.0 * underflow <= radius or radius == 0.0:
-        return high + (low - radius), upper, 0
-    if upper <= 0.0:
+    if math.isfinite(upper) and 3.0 * underflow <= radius or radius == 0.0 or upper <= 0.0:
         return high + (low - radius), upper, 0
     high, low, radius, exponent = wide_gain(mass_matrix, v, w)
     return high + (low - radius), high + (low + radius), exponent
@@ -193,21 +191,6 @@ def write_step(v, change, factor, w):
     """Write w = v + factor · change."""
     for k in range(v.shape[0]):
         w[k] = v[k] + factor * change[k]
-
-
-@kernel
-def _turn_roundings(mass_matrix, change, w):
-    """Move each changed coordinate by one unit in the last place against its momentum, which lowers the energy."""
-    for i in range(w.shape[0]):
-        if change[i] == 0.0:
-            continue
-        momentum = 0.0
-        for j in range(w.shape[0]):
-            momentum += (mass_matrix[i, j] + mass_matrix[j, i]) * w[j]
-        if momentum > 0.0:
-            w[i] = np.nextafter(w[i], -math.inf)
-        elif momentum < 0.0:
-            w[i] = np.nextafter(w[i], math.inf)
 
 
 @kernel
@@ -244,10 +227,15 @@ def passive_step(mass_matrix, v, change, alpha, w):
 
 @kernel
 def _turned(mass_matrix, v, change, alpha, w):
-    """Write v + α change, moved by last-place units that lower its energy; return whether it gains no energy."""
+    """Write v + α change, moved by last-place units against its momentum; return whether it gains no energy."""
     write_step(v, change, alpha, w)
     for _ in range(_TURNS):
-        _turn_roundings(mass_matrix, change, w)
+        for i in range(w.shape[0]):
+            momentum = 0.0
+            for j in range(w.shape[0]):
+                momentum += (mass_matrix[i, j] + mass_matrix[j, i]) * w[j]
+            if change[i] != 0.0 and momentum != 0.0:
+                w[i] = np.nextafter(w[i], -math.inf if momentum > 0.0 else math.inf)
         if never_gains(mass_matrix, v, w):
             return True
     return False

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iapb.compiled import kernel
+from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import apply_change, whiten_impact
-from iapb.linalg import orthogonalize
+from iapb.linalg import dot_of, from_whitened, orthogonalize
 
 # A row counts as closing if its speed exceeds this share of |b|, the rounding of a d-term sum of unit rows.
 _CLOSING = 1e-13
@@ -41,78 +41,60 @@ def make_push_work(coordinates: int, contacts: int) -> PushWork:
 
 
 @kernel
-def _solve_passive(rows, b, passive, known, size, q, triangle, solution):
-    """Solve least squares on the passive rows: solution[j] for passive[j]; return how many rows are independent.
-
-    The first `known` directions are reused from the call before, which had the same rows.
-    """
-    d = b.shape[0]
-    for j in range(known, size):
-        for k in range(d):
-            q[j, k] = rows[k, passive[j]]
-        square = orthogonalize(q, j, d, triangle)
-        if square <= _CLOSING * _CLOSING:
-            return j
-        triangle[j, j] = math.sqrt(square)
-        for k in range(d):
-            q[j, k] /= triangle[j, j]
-    for j in range(size - 1, -1, -1):
-        total = 0.0
-        for k in range(d):
-            total -= q[j, k] * b[k]
-        for m in range(j + 1, size):
-            total -= triangle[j, m] * solution[m]
-        solution[j] = total / triangle[j, j]
-    return size
-
-
-@kernel
-def _most_closing(rows, count, residual, work):
-    """Return the free row with the most negative rᵢ·residual, and this value."""
-    best, speed = -1, 0.0
-    for i in range(count):
-        if not (work.held[i] or work.banned[i]):
-            closing = 0.0
-            for k in range(residual.shape[0]):
-                closing += rows[k, i] * residual[k]
-            if closing < speed:
-                best, speed = i, closing
-    return best, speed
-
-
-@kernel
 def push_only(rows, count, b, p, residual, work):
     """Solve `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`; write p and residual = b + Aᵀp. Return False if it did not converge.
 
     rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,); work : a `PushWork`.
     """
-    d = b.shape[0]
-    norm, size, known = 0.0, 0, 0
-    for k in range(d):
-        residual[k] = b[k]
-        norm += b[k] * b[k]
-    for i in range(count):
-        p[i] = 0.0
-        work.held[i] = work.banned[i] = False
-    threshold = _CLOSING * math.sqrt(norm) * max(1, d)
+    d, size, known = b.shape[0], 0, 0
+    copy_into(residual, b)
+    p[:count] = 0.0
+    work.held[:count] = False
+    work.banned[:count] = False
+    threshold = _CLOSING * math.sqrt(dot_of(b, b)) * max(1, d)
     for _ in range(10 * (count + d) + 10):
-        entering, speed = _most_closing(rows, count, residual, work)
+        entering, speed = -1, 0.0
+        for i in range(count):
+            if not (work.held[i] or work.banned[i]):
+                closing = dot_of(rows[:, i], residual)
+                if closing < speed:
+                    entering, speed = i, closing
         if entering < 0 or speed >= -threshold:
             return True
         work.passive[size] = entering
-        size += 1
-        if size <= d:
-            known = _solve_passive(rows, b, work.passive, known, size, work.q, work.triangle, work.solution)
-        if known < size:
+        if size < d:
+            known = _solve_passive(rows, b, known, size + 1, work)
+        if known <= size:
             work.banned[entering] = True  # dependent on the passive rows: it cannot close alone
-            size -= 1
             continue
         work.held[entering] = True
-        size, known = _retreat(rows, b, size, p, work)
-        _set_residual(rows, b, work.passive, size, p, residual)
-        for i in range(count):
-            work.banned[i] = False
+        size, known = _retreat(rows, b, size + 1, p, work)
+        for k in range(d):
+            residual[k] = b[k]
+            for j in range(size):
+                residual[k] += rows[k, work.passive[j]] * p[work.passive[j]]
+        work.banned[:count] = False
     return False
+
+
+@kernel
+def _solve_passive(rows, b, known, size, work):
+    """Solve least squares on the passive rows, with `known` directions given; return how many are independent."""
+    q, triangle, solution = work.q, work.triangle, work.solution
+    for j in range(known, size):
+        copy_into(q[j, : b.shape[0]], rows[:, work.passive[j]])
+        square = orthogonalize(q[j, : b.shape[0]], q, j, triangle[:, j])
+        if square <= _CLOSING * _CLOSING:
+            return j
+        triangle[j, j] = math.sqrt(square)
+        for k in range(b.shape[0]):
+            q[j, k] /= triangle[j, j]
+    for j in range(size - 1, -1, -1):
+        total = -dot_of(q[j], b)
+        for m in range(j + 1, size):
+            total -= triangle[j, m] * solution[m]
+        solution[j] = total / triangle[j, j]
+    return size
 
 
 @kernel
@@ -133,66 +115,41 @@ def _retreat(rows, b, size, p, work):
             return size, size
         p[passive[blocking]] = 0.0
         work.held[passive[blocking]] = False
-        for j in range(blocking, size - 1):
-            passive[j] = passive[j + 1]
         size -= 1
-        known = _solve_passive(rows, b, passive, blocking, size, work.q, work.triangle, solution)
+        for j in range(blocking, size):
+            passive[j] = passive[j + 1]
+        known = _solve_passive(rows, b, blocking, size, work)
         if known < size:
             return size, known
 
 
 @kernel
-def _set_residual(rows, b, passive, size, p, residual):
-    """Write residual = b + Aᵀp."""
-    for k in range(b.shape[0]):
-        total = b[k]
-        for j in range(size):
-            total += rows[k, passive[j]] * p[passive[j]]
-        residual[k] = total
-
-
-@kernel
-def poisson_impulses(rows, count, u, restitution, p, change, work):
-    """Apply Poisson's law, eᵢ in [0, 1], by two LCPs; write p (unit rows) and Δu = Aᵀp. Return False if not converged.
+def poisson_impact(mass_matrix, lower, v, restitution, count, clamped, work, push, impulses, v_plus, momentum):
+    """Resolve `count` rows, columns of `work.columns`, by Poisson's law with e in [0, 1] for each, by two LCPs.
 
     Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
     p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
-    """
-    d = u.shape[0]
-    compressed, final, more = work.compressed[:d], work.final[:d], work.more
-    if not push_only(rows, count, u, p, compressed, work):
-        return False
-    for i in range(count):
-        returned = restitution[i] * p[i]
-        for k in range(d):
-            compressed[k] += rows[k, i] * returned
-        p[i] += returned
-    if not push_only(rows, count, compressed, more, final, work):
-        return False
-    for i in range(count):
-        p[i] += more[i]
-    for k in range(d):
-        change[k] = final[k] - u[k]
-    return True
-
-
-# An impact with unequal restitution: Poisson's law by two LCPs, then the energy clamp.
-
-
-@kernel
-def poisson_impact(mass_matrix, lower, v, restitution, count, clamped, work, push, impulses, v_plus, momentum):
-    """Resolve `count` rows, given as columns of `work.columns`, each with its own e in [0, 1].
-
     Writes v⁺, the generalized impulse M(v⁺ − v⁻) and the impulses along the rows; returns (number of rows that
     push, clamp). If the active-set method does not converge, it returns (−1, 1) and v⁺ is not written.
     """
-    d = v.shape[0]
+    d, rows = v.shape[0], work.rows
+    u, compressed, final = work.u[:d], push.compressed[:d], push.final[:d]
     whiten_impact(lower, v, count, work)
-    if not poisson_impulses(work.rows, count, work.u[:d], restitution, impulses, work.change[:d], push):
+    if not push_only(rows, count, u, impulses, compressed, push):
         return -1, 1.0
-    clamp = apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum)
-    pushing = 0
     for i in range(count):
+        returned = restitution[i] * impulses[i]
+        for k in range(d):
+            compressed[k] += rows[k, i] * returned
+        impulses[i] += returned
+    if not push_only(rows, count, compressed, push.more, final, push):
+        return -1, 1.0
+    for k in range(d):
+        work.change[k] = final[k] - u[k]
+    from_whitened(lower, work.change[:d], work.v_change)
+    clamp, pushing = apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum), 0
+    for i in range(count):
+        impulses[i] += push.more[i]
         pushing += impulses[i] > 0.0
         impulses[i] = clamp * impulses[i] / work.length[i] if work.length[i] > 0.0 else 0.0
     return pushing, clamp

@@ -126,8 +126,6 @@ class State(NamedTuple):
     group_impulse: np.ndarray  # (d,)
     row_impulse: np.ndarray  # (rows,)
     row_restitution: np.ndarray  # (rows,)
-    triangle: np.ndarray  # (d, d)
-    target: np.ndarray  # (d,)
     row: np.ndarray  # (d,) one contact row nᵀJ
     work: ImpactWork
     push_work: PushWork

@@ -95,7 +95,7 @@ def test_a_small_study_is_complete_and_its_answers_are_right(measured: Table) ->
 def test_every_compiled_rival_solves_an_easy_impact() -> None:
     case = timed_problems(4, 3)[0]
     truth = np.array([float(x) for x in case.truth])
-    for call in (KernelCall(case), SweepsCall(case, 4096), LemkeCall(case), engine_call(case, "factored")):
+    for call in (KernelCall(case), SweepsCall(case, 4096), LemkeCall(case), engine_call(case)):
         assert case.distance(call(), truth) < 1e-9, call
 
 

@@ -22,13 +22,13 @@ from verification.laws.counterexample import as_test, shrink
 from verification.laws.planted import (
     TOO_MUCH,
     each_contact_its_own_restitution,
-    printed_formula,
     returns_too_much,
 )
 from verification.laws.resolver import Resolver
+from verification.methods import gram_pinv, svd
 
 
-@pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, partial(resolve_impact, method="svd")])
+@pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, svd])
 def test_sound_resolvers_pass(resolver: object) -> None:
     report = check_passivity(resolver, impacts=200)
     assert report.passed, report
@@ -72,10 +72,9 @@ def _bits(M: Floats, J: Floats, v: Floats, e: float) -> bytes:
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("printed", [printed_formula, partial(resolve_impact, method="gram_pinv")])
-def test_the_printed_formula_is_found_to_gain_energy(printed: Resolver, seed: int) -> None:
+def test_the_printed_formula_is_found_to_gain_energy(seed: int) -> None:
     """How much it gains is up to the BLAS; that the reported gains are gains, exact rationals say."""
-    resolver = _Remembered(printed)
+    resolver = _Remembered(gram_pinv)
     report = check_passivity(resolver, impacts=100, seed=seed, search=60)
     assert not report.passed and report.broken_laws[0] == report.counterexample_law == "kinetic_energy"
     for case in (report.counterexample, report.verdict("kinetic_energy").worst_case):

@@ -1,0 +1,273 @@
+"""Whole impacts in one call: scale by powers of two, resolve, scale back, bound the energy.
+
+Scaling every coordinate to a unit diagonal of M, every row to a largest entry near one and the velocity to a largest
+entry near one is exact in binary arithmetic. So no intermediate result over- or underflows, and a change of units or
+of row scale by a power of two changes no bit of the result.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from iapb.compiled import copy_into, kernel
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, make_impact_work, rank_tolerance
+from iapb.contact.kernels.impact_friction import FrictionWork, add_impact_friction, make_friction_work
+from iapb.contact.kernels.passive import gain_enclosure, passive_step
+from iapb.contact.kernels.projector import minimum_norm_impulses
+from iapb.contact.kernels.unilateral import PushWork, make_push_work, poisson_impact
+from iapb.double_double import kinetic_energies
+from iapb.linalg import add_multiple, cholesky, dot_of
+
+# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as given, in which the skew
+# part cancels; the Cholesky factor is that of the symmetric part.
+SYMMETRY_TOLERANCE = 1e-9
+LARGEST_ENTRY = 2.0  # of the scaled M: |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds where M is positive definite
+_LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
+_EXACT = 1000  # largest difference of binary exponents from the largest entry that still scales exactly
+# Where a contact still closes faster than this share of ‖Aᵢ‖ |u|, or the energy clamp takes more than this, the two
+# LCPs of Poisson's law were not solved. Rounding leaves 1e-13; nearly dependent rows that push against each other more.
+_UNSOLVED = 1e-6
+
+# How an impact ends; the last two have no result.
+COMPLETE, BUDGET, CANCELLED, REDUCED, NOT_SOLVED, REFUSED, NOT_CONVERGED = range(7)
+
+
+class Results(NamedTuple):
+    """What n impacts write: d coordinates, c contacts, m tangents each."""
+
+    velocity: np.ndarray  # (n, d) v⁺
+    generalized_impulse: np.ndarray  # (n, d)
+    impulses: np.ndarray  # (n, c)
+    tangential: np.ndarray  # (n, c m)
+    rank: np.ndarray  # (n,) int64
+    status: np.ndarray  # (n,) int64
+    clamp: np.ndarray  # (n,)
+    friction_share: np.ndarray  # (n,)
+    energy: np.ndarray  # (n, 3) change, its lower and its upper bound
+
+
+class ResolveWork(NamedTuple):
+    """Scratch of one whole impact: d coordinates, c contacts."""
+
+    mass: np.ndarray  # (d, d) scaled, symmetric to rounding
+    lower: np.ndarray  # (d, d) the Cholesky factor of its symmetric part
+    velocity: np.ndarray  # (d,) scaled
+    v_plus: np.ndarray  # (d,) scaled
+    coordinate_exponent: np.ndarray  # s (d,)
+    row_exponent: np.ndarray  # r (c,)
+    size: np.ndarray  # (c,) ratio of the caller's rows to the scaled rows, up to one common factor
+    length: np.ndarray  # (c,)
+    impact: ImpactWork
+    push: PushWork
+    friction: FrictionWork
+
+
+def make_resolve_work(coordinates: int, contacts: int, tangents: int) -> ResolveWork:
+    """Allocate the scratch for `contacts` rows on `coordinates` velocities, with `tangents` directions of friction."""
+    d, c = coordinates, contacts
+    return ResolveWork(
+        np.zeros((d, d)), np.zeros((d, d)), np.zeros(d), np.zeros(d), np.zeros(d, np.int64), np.zeros(c, np.int64),
+        np.zeros(c), np.zeros(c), make_impact_work(d, max(1, c)), make_push_work(d, max(1, c)),
+        make_friction_work(d, max(1, c), tangents))
+
+
+@kernel
+def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, friction, tolerance, budget, clamped,
+                 work, out):
+    """Resolve n impacts in the caller's units; return the number of the first without a result, n if there is none.
+
+    unequal : (n, c) restitution of each contact, by Poisson's law; None: `restitution` (n,), by (21) in factored form.
+    tangents (n, c m, d), friction (n, c) : Coulomb's friction, added to (21), or None.
+    tolerance : rank tolerance of the rows; 0 selects the default.  out : `Results`
+    """
+    n, c, d = jacobians.shape
+    lower, impact = work.lower, work.impact
+    for m in range(n):
+        v_plus, momentum, p, p_t = out.velocity[m], out.generalized_impulse[m], out.impulses[m], out.tangential[m]
+        out.status[m] = REFUSED
+        sound, k, rounded = scale_impact(masses[m], jacobians[m], velocities[m], tangents is None, work)
+        if not sound:
+            return m
+        share, status = 1.0, COMPLETE
+        if unequal is not None:
+            rank, clamp = poisson_impact(work.mass, lower, work.velocity, unequal[m], c, clamped, impact, work.push, p,
+                                         work.v_plus, momentum)
+            if rank < 0:
+                out.status[m] = NOT_CONVERGED
+                return m
+            status = COMPLETE if clamp >= 1.0 - _UNSOLVED and separates(d, c, impact) else NOT_SOLVED
+        else:
+            least = tolerance if tolerance > 0.0 else rank_tolerance(lower)
+            rank, clamp = factored_impact(work.mass, lower, work.velocity, restitution[m], c, least, budget, clamped,
+                                          impact, work.v_plus, momentum)
+            if rank == budget and rank < d:
+                for i in range(c):
+                    status = BUDGET if impact.size[i] > least * least else status
+            if tangents is None:
+                least_norm_impulses(d, c, rank, work, p)
+            else:
+                for j in range(p_t.shape[0]):
+                    for i in range(d):
+                        work.friction.free[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
+                copy_into(work.friction.coefficient[:c], friction[m])
+                share, factor, met = add_impact_friction(work.mass, lower, work.velocity, c, rank, impact, work.push,
+                                                         work.friction, p, work.v_plus, momentum)
+                clamp *= factor
+                status = COMPLETE if met else REDUCED
+                copy_into(p_t, work.friction.p)
+        factor = unscale_impact(masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.energy[m])
+        clamp *= factor
+        if not (finite(v_plus) and finite(momentum) and finite(p) and finite(p_t) and math.isfinite(out.energy[m, 0])):
+            return m
+        out.rank[m], out.clamp[m], out.friction_share[m] = rank, clamp, share
+        out.status[m] = CANCELLED if clamp == 0.0 or rounded and c > 0 else status
+    return n
+
+
+@kernel
+def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
+    """Scale: v' = 2^−(s + k) v, M' = 2^(s + s) M, J' = 2^(s + r) J, with r = 0 if rows are not to be scaled; factor M'.
+
+    Returns whether all is finite and M symmetric and positive definite, k, and whether scaling rounded entries of v.
+    """
+    d, c, s, r = velocity.shape[0], jacobian.shape[0], work.coordinate_exponent, work.row_exponent
+    for i in range(d):
+        if not (mass_matrix[i, i] > 0.0 and math.isfinite(mass_matrix[i, i]) and math.isfinite(velocity[i])):
+            return False, 0, False
+        s[i] = -(math.frexp(mass_matrix[i, i])[1] // 2)
+    for i in range(d):
+        for j in range(d):
+            work.mass[i, j] = np.ldexp(mass_matrix[i, j], s[i] + s[j])
+    for i in range(d):
+        for j in range(d):
+            a, b = work.mass[i, j], work.mass[j, i]
+            if not (abs(a) <= LARGEST_ENTRY and abs(a - b) <= SYMMETRY_TOLERANCE):
+                return False, 0, False
+            work.lower[i, j] = a if a == b else 0.5 * (a + b)
+    if cholesky(work.lower, work.lower) != 0:
+        return False, 0, False
+    k, rounded = _LOWEST_EXPONENT, False
+    for i in range(d):
+        k = max(k, _exponent(velocity[i]) - s[i])
+    k = 0 if k <= _LOWEST_EXPONENT // 2 else k
+    for i in range(d):
+        rounded = rounded or _LOWEST_EXPONENT // 2 < _exponent(velocity[i]) - s[i] < k - _EXACT
+        work.velocity[i] = np.ldexp(velocity[i], -(s[i] + k))
+    for i in range(c):
+        r[i] = -_LOWEST_EXPONENT  # of a row of zeros
+        for j in range(d):
+            if not math.isfinite(jacobian[i, j]):
+                return False, 0, False
+            r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
+        r[i] = r[i] if scales_rows else 0
+        for j in range(d):
+            work.impact.columns[j, i] = np.ldexp(jacobian[i, j], r[i] + s[j])
+    return True, k, rounded
+
+
+@kernel
+def _exponent(value):
+    """Return the binary exponent; for zero, one that is never the maximum."""
+    return math.frexp(value)[1] if value != 0.0 else _LOWEST_EXPONENT
+
+
+@kernel
+def separates(d, count, impact):
+    """Whether no contact closes after Poisson's law, to rounding."""
+    limit = -_UNSOLVED * math.sqrt(dot_of(impact.u[:d], impact.u[:d]))
+    for i in range(count):
+        speed = 0.0
+        for k in range(d):
+            speed += impact.rows[k, i] * (impact.u[k] + impact.change[k])
+        if speed < limit:
+            return False
+    return True
+
+
+@kernel
+def least_norm_impulses(d, count, rank, work, impulses):
+    """Write the p of least norm along the *caller's* rows with Aᵀp = Δu, as p' = 2^−r p for the scaled rows.
+
+    If row sizes differ, the p of least norm is computed first. Its rounding leaves a residual of Δu, which a p' of
+    least norm then corrects; this second solve does not depend on the row sizes.
+    """
+    impact, r, least, even = work.impact, work.row_exponent, -_LOWEST_EXPONENT, True
+    for i in range(count):
+        least = min(least, r[i])
+    for i in range(count):
+        work.size[i] = np.ldexp(1.0, max(least - r[i], -1000))
+        even = even and (r[i] == least or r[i] > -_LOWEST_EXPONENT // 2)
+        work.length[i] = impact.length[i] * work.size[i]
+    minimum_norm_impulses(d, count, rank, work.length, impact.change[:d], impulses, impact)
+    if even:
+        return
+    for i in range(count):
+        impulses[i] *= work.size[i]
+    for k in range(d):
+        total = 0.0
+        for i in range(count):
+            total += impact.rows[k, i] * impact.length[i] * impulses[i]
+        impact.v_change[k] = impact.change[k] - total
+    minimum_norm_impulses(d, count, rank, impact.length, impact.v_change[:d], work.length, impact)
+    add_multiple(impulses, 1.0, work.length)
+
+
+@kernel
+def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, impulses, tangential, energy):
+    """Return to the caller's units in place; clamp the step again if this rounding raised the energy.
+
+    Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of this clamp.
+    """
+    d, s = velocity.shape[0], work.coordinate_exponent
+    for i in range(d):
+        v_plus[i] = np.ldexp(work.v_plus[i], s[i] + k)
+        momentum[i] = np.ldexp(momentum[i], k - s[i])
+    for i in range(impulses.shape[0]):
+        impulses[i] = np.ldexp(impulses[i], work.row_exponent[i] + k)
+    for j in range(tangential.shape[0]):
+        tangential[j] = np.ldexp(tangential[j], k)
+    if not finite(v_plus):
+        return 1.0
+    factor = 1.0
+    lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
+    if clamped and not upper <= 0.0:
+        step = work.impact.v_change
+        for i in range(d):
+            step[i] = v_plus[i] - velocity[i]
+        factor = passive_step(mass_matrix, velocity, step[:d], 1.0, v_plus)
+        for i in range(d):
+            work.v_plus[i] = np.ldexp(v_plus[i], -(s[i] + k))
+            momentum[i] *= factor
+        for i in range(impulses.shape[0]):
+            impulses[i] *= factor
+        for j in range(tangential.shape[0]):
+            tangential[j] *= factor
+        lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
+    change = np.ldexp(kinetic_energies(work.mass, work.velocity, work.v_plus)[1], 2 * k)
+    low, high = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
+    change = low if low > change else change
+    energy[0], energy[1], energy[2] = high if high < change else change, low, high
+    return factor
+
+
+@kernel
+def _outward(value, exponent, towards):
+    """Return value · 2^exponent, rounded one step outwards; a bound that shows no gain (or no loss) still shows it."""
+    bound = np.nextafter(np.ldexp(value, exponent), towards)
+    if towards > 0.0 and value <= 0.0:
+        return min(bound, 0.0)
+    if towards < 0.0 and value >= 0.0:
+        return max(bound, 0.0)
+    return bound
+
+
+@kernel
+def finite(vector):
+    """Whether all entries are finite."""
+    sound = True
+    for k in range(vector.shape[0]):
+        sound = sound and math.isfinite(vector[k])
+    return sound

@@ -1,0 +1,63 @@
+"""Other methods for an impact, to compare `iapb.resolve_impact` with: plain numpy, unscaled, without clamp.
+
+Each returns v⁺ (d,) from M (d, d), J (c, d), v (d,) and e. Through LAPACK the last bits depend on the processor, and
+where W = J M⁻¹ Jᵀ is formed, its condition number amplifies them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from iapb.contact.kernels.impact import rank_tolerance
+from iapb.errors import ArgumentError
+from verification.impacts import Floats
+
+_EPS = float(np.finfo(float).eps)
+
+
+def gram_pinv(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Return v⁺ by (20)-(21) as printed, with numpy's pseudo-inverse and its classical cutoff 1e-15."""
+    push = np.linalg.solve(M, J.T)
+    return np.asarray(v - (1.0 + e) * (push @ (np.linalg.pinv(J @ push, rcond=1e-15) @ (J @ v))))
+
+
+def gram_cholesky(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Return v⁺ by (19), with Cholesky's factor of W; the rows must be independent."""
+    push = np.linalg.solve(M, J.T)
+    W = J @ push
+    length = np.sqrt(np.maximum(np.diag(W), 0.0))
+    # The smallest eigenvalue of a Gram matrix of unit rows is known to c·ε only.
+    if not length.all() or np.linalg.eigvalsh(W / np.outer(length, length))[0] <= 8.0 * len(J) * _EPS:
+        raise ArgumentError("contact_jacobian", J.shape, "independent rows for method 'gram_cholesky'")
+    root = np.linalg.cholesky(0.5 * (W + W.T))
+    return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(root.T, np.linalg.solve(root, J @ v))))
+
+
+def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Return v⁺ by (W + λI)⁻¹, λ = 1e-8 of W's largest diagonal entry: every mode keeps part of its approach."""
+    push = np.linalg.solve(M, J.T)
+    W = J @ push
+    share = 1e-8 * max(np.diag(W).max(initial=0.0), np.finfo(float).tiny)
+    return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(W + share * np.eye(len(W)), J @ v)))
+
+
+def svd(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Return v⁺ by (21) with the projector from the truncated singular value decomposition of the unit rows of A."""
+    lower = np.linalg.cholesky(M)
+    rows = np.linalg.solve(lower, J.T).T
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    _, singular, right = np.linalg.svd(rows / np.where(length > 0.0, length, 1.0), full_matrices=False)
+    Q, u = right[singular > rank_tolerance(lower)], lower.T @ v
+    return np.asarray(np.linalg.solve(lower.T, u - (1.0 + e) * Q.T @ (Q @ u)))
+
+
+# To add a method, add a line here.
+COMPARED: dict[str, Callable[..., Any]] = {
+    "gram_pinv": gram_pinv,
+    "gram_cholesky": gram_cholesky,
+    "damped": damped,
+    "svd": svd,
+}
