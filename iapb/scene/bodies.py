@@ -171,8 +171,6 @@ Wall = Annotated[HalfPlaneWall | BoxWall | CircleWall | PolygonWall, Field(discr
 SpatialShape = Annotated[Cuboid | Ball, Field(discriminator="kind")]
 SpatialWall = Annotated[HalfSpaceWall | CuboidWall | BallWall, Field(discriminator="kind")]
 
-LIMITED = ("revolute", "prismatic")  # joints that can have limits: their one coordinate is a length or an angle
-
 Axis = Annotated[V | None, Field(description="direction of the joint if it has one, any length, joint frame")]
 Origin = Annotated[V, Field(description="where the joint lies [m], parent's axes")]
 CenterOfMass = Annotated[V, Field(description="centre of mass [m], body axes")]
@@ -238,8 +236,7 @@ class AnyBody(Part):
             return given
         kind = KINDS[joint]
         if field == "axis":
-            others = f"only a {' or '.join(cls.with_axis)} joint has one, this joint is {joint}"
-            require(given is None or joint in cls.with_axis, f"no axis: {others}")
+            require(given is None or joint in cls.with_axis, f"no axis: a {joint} joint has none")
             require(given is not None or joint not in cls.with_axis, f"the direction of the {joint} joint")
             return given and with_direction(given)
         if field == "mass":
@@ -247,7 +244,7 @@ class AnyBody(Part):
                     f"a mass >= {SMALLEST_POSITIVE} kg: the {joint} joint moves it")
         elif field == "joint_limits" and given is not None:
             start = (info.data.get("position") or given)[0]
-            require(joint in LIMITED, f"no limits: only a {' or '.join(LIMITED)} joint has them, this joint is {joint}")
+            require(joint in ("revolute", "prismatic"), f"no limits: a {joint} joint has none")
             require(given[0] < given[1], "two numbers, the smaller one first")
             require(given[0] <= start <= given[1], f"limits around the start, position = {start:g}")
         elif field == "position":

@@ -17,7 +17,6 @@ from iapb.scene.parts import Path, written
 MAX_CHARACTERS = 1_000_000
 MAX_DEPTH = 24  # the deepest valid value, a vertex of a body's shape, has depth 7
 MAX_NODES = 100_000  # values and field names after expansion of aliases, which could make a small file huge
-MAX_REPEATED = 100  # largest number of repeated fields to report
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _WORDS: dict[str, Any] = {
@@ -49,39 +48,40 @@ class Document:
         """
         self.file, self._what, self._count = file, what, 0
         self.mistakes: list[Mistake] = []
+        self._keys: dict[Path, tuple[int, int]] = {}
         if len(text) > MAX_CHARACTERS:
-            raise self._refusal(None, f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters")
-        self._root = self._composed(text)
-        self.value = self._plain(self._root, ()) if self._root else None
+            raise self._refusal((1, 1), f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters")
+        root = self._composed(text)
+        self._places: dict[Path, tuple[int, int]] = {(): (1, 1)} if root is None else {}
+        self.value = None if root is None else self._plain(root, ())
 
     def _composed(self, text: str) -> Any:
         from ruamel.yaml import YAML
-        from ruamel.yaml.error import MarkedYAMLError, YAMLError
+        from ruamel.yaml.error import YAMLError
 
         yaml = YAML(typ="safe", pure=True)
         yaml.composer.warn_double_anchors = False
         try:
             return yaml.compose(text)
-        except MarkedYAMLError as failure:
-            mark = failure.problem_mark or failure.context_mark
-            raise self._refusal(mark, "(not YAML)", f"valid YAML: {failure.problem or failure}") from failure
-        except (YAMLError, ValueError, OverflowError) as failure:  # a character that YAML forbids: there is no mark
-            raise self._refusal(None, "(not YAML)", f"valid YAML: {' '.join(str(failure).split())}") from failure
-        except RecursionError as failure:
-            raise self._refusal(None, "(nested too deeply)", f"at most {MAX_DEPTH} levels") from failure
+        except (YAMLError, ValueError, OverflowError, RecursionError) as failure:
+            mark, problem = (getattr(failure, name, None) for name in ("problem_mark", "problem"))
+            place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+            said = problem or " ".join(str(failure).split())
+            raise self._refusal(place, "(not YAML)", f"valid YAML: {said}") from failure
 
-    def _refusal(self, mark: Any, value: str, expected: str) -> SceneError:
-        return SceneError([Mistake(self.file, *_place(mark), "(file)", value, expected)], self._what)
+    def _refusal(self, place: tuple[int, int], value: str, expected: str) -> SceneError:
+        return SceneError([Mistake(self.file, *place, "(file)", value, expected)], self._what)
 
     def _plain(self, node: Any, path: Path) -> Any:
         """Return the value of a node; an alias is expanded wherever it stands."""
         self._count += 1
+        place = self._places.setdefault(path, _place(node))
         if self._count > MAX_NODES:
-            raise self._refusal(node.start_mark, f"more than {MAX_NODES} values", "a smaller scene")
+            raise self._refusal(place, f"more than {MAX_NODES} values", "a smaller scene")
         if node.ctag.handle is not None:
-            raise self._refusal(node.start_mark, str(node.ctag), "no tags: a scene is plain numbers, texts and lists")
+            raise self._refusal(place, str(node.ctag), "no tags: a scene is plain numbers, texts and lists")
         if len(path) > MAX_DEPTH:
-            raise self._refusal(node.start_mark, "(nested too deeply)", f"at most {MAX_DEPTH} levels")
+            raise self._refusal(place, "(nested too deeply)", f"at most {MAX_DEPTH} levels")
         if node.id == "scalar":
             return scalar(node.value) if node.style is None else node.value
         if node.id == "sequence":
@@ -89,34 +89,28 @@ class Document:
         found: dict[str, Any] = {}
         for key, child in node.value:
             if key.id != "scalar":
-                raise self._refusal(key.start_mark, "(not a name)", "the name of a field")
+                raise self._refusal(_place(key), "(not a name)", "the name of a field")
             self._count += 1
             here = (*path, key.value)
+            self._keys.setdefault(here, _place(key))
             value = self._plain(child, here)
             if key.value not in found:
                 found[key.value] = value
-            elif len(self.mistakes) < MAX_REPEATED:
-                place = _place(key.start_mark)
-                self.mistakes.append(Mistake(self.file, *place, written(here), "(repeated)", "each field once"))
+            else:
+                self.mistakes.append(Mistake(self.file, *_place(key), written(here), "(repeated)", "each field once"))
         return found
 
     def place(self, path: Path, key: bool = False) -> tuple[int, int]:
         """Return line and column, from 1, of a value or of its key; if it is absent, of the nearest value around it."""
-        node, mark = self._root, self._root and self._root.start_mark
-        for step in path if node else ():
-            pairs: Any = ()
-            if node.id != "scalar":
-                pairs = node.value if node.id == "mapping" else [(child, child) for child in node.value]
-            names = [name.value if node.id == "mapping" else i for i, (name, _) in enumerate(pairs)]
-            if step not in names:
-                return _place(mark)
-            name, node = pairs[names.index(step)]
-            mark = node.start_mark
-        return _place(name.start_mark if key and node and path else mark)
+        if key and path in self._keys:
+            return self._keys[path]
+        while path not in self._places:
+            path = path[:-1]
+        return self._places[path]
 
 
-def _place(mark: Any) -> tuple[int, int]:
-    return (mark.line + 1, mark.column + 1) if mark else (1, 1)
+def _place(node: Any) -> tuple[int, int]:
+    return node.start_mark.line + 1, node.start_mark.column + 1
 
 
 def scalar(text: str) -> Any:

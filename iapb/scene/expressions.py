@@ -41,7 +41,6 @@ def _power(base: float, exponent: float) -> float:
     return math.prod([base] * int(exponent))
 
 
-NAMES = {"pi": math.pi}
 FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {  # with the least number of arguments
     "sin": (lambda x: _sine_cosine(x)[0], 1), "cos": (lambda x: _sine_cosine(x)[1], 1), "exp": (_exp, 1),
     "sqrt": (math.sqrt, 1), "abs": (abs, 1), "step": (lambda x: 1.0 if x >= 0.0 else 0.0, 1),
@@ -73,27 +72,27 @@ def function_of(text: str) -> Function:
 
 def _made(node: ast.expr) -> Function:
     """Turn one node into a function of t; raise SyntaxError for a node that an expression may not contain."""
+    called: Callable[..., float] | None = None
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             number = float(value)
             return lambda t: number
         case ast.Name(id="t"):
             return lambda t: t
-        case ast.Name(id=name) if name in NAMES:
-            return lambda t: NAMES[name]
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-            of, first, second = _OPERATORS[type(op)], _made(left), _made(right)
-            return lambda t: of(first(t), second(t))
-        case ast.UnaryOp(operand=operand, op=op) if type(op) in _OPERATORS:
-            of, only = _OPERATORS[type(op)], _made(operand)
-            return lambda t: of(only(t))
+        case ast.Name(id="pi"):
+            return lambda t: math.pi
+        case ast.BinOp(left=left, op=op, right=right):
+            called, given = _OPERATORS.get(type(op)), [left, right]
+        case ast.UnaryOp(operand=operand, op=op):
+            called, given = _OPERATORS.get(type(op)), [operand]
         case ast.Call(func=ast.Name(id=name), args=given, keywords=[]) if name in FUNCTIONS:
             called, least = FUNCTIONS[name]
             if len(given) != least and not (least == 2 and len(given) > 2):
                 raise SyntaxError(f"{name} takes {least} number{'s or more' if least > 1 else ''}")
-            arguments = [_made(argument) for argument in given]
-            return lambda t: called(*(argument(t) for argument in arguments))
-    raise SyntaxError(f"an expression of {_KNOWN}")
+    if called is None:
+        raise SyntaxError(f"an expression of {_KNOWN}")
+    arguments = [_made(argument) for argument in given]
+    return lambda t: called(*(argument(t) for argument in arguments))
 
 
 def _checked(text: str) -> str:

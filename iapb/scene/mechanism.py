@@ -201,8 +201,8 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> tuple[Stop, ...]:
         if body.joint_limits is not None:
             turned = float(inertia[first[i]]) if body.joint == "revolute" else 0.0
             arm = math.sqrt(turned / carried[i]) if turned > 0.0 and carried[i] > 0.0 else 1.0
-            found += [Stop(i, parents[i], sign, bound, arm)
-                      for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True)]
+            low, high = body.joint_limits
+            found += [Stop(i, parents[i], 1.0, low, arm), Stop(i, parents[i], -1.0, high, arm)]
     return tuple(found)
 
 

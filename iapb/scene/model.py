@@ -290,10 +290,6 @@ class Scene(Part):
         """The YAML text of this scene."""
         return self._source_text
 
-    def __eq__(self, other: Any) -> bool:
-        """Return whether kind, values and text are the same."""
-        return isinstance(other, Scene) and self.source_text == other.source_text and super().__eq__(other)
-
     def place_of(self, *path: str | int) -> str:
         """Return the place of a field as "file:line:column: "; empty if the scene was not read from a file."""
         if not self._file:

@@ -30,19 +30,26 @@ Truth = Annotated[bool, Field(strict=True)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=True)]
 Text = Annotated[str, Field(max_length=2000, strict=True)]
 
-OURS, MISSING = "scene", "scene_missing"  # error types of this project; their message says what was expected
 Path = tuple[str | int, ...]  # of a value, such as ("bodies", 0, "mass")
 
 
-def expectation(expected: str, kind: str = OURS) -> PydanticCustomError:
+def expectation(expected: str) -> PydanticCustomError:
     """Return the error for a field that breaks a rule of this project; its message says what was expected."""
-    return PydanticCustomError(kind, "{expected}", {"expected": expected})
+    return PydanticCustomError("scene", "{expected}", {"expected": expected})
 
 
 def require(holds: bool, expected: str) -> None:
     """Raise the error for a field that breaks a rule of this project."""
     if not holds:
         raise expectation(expected)
+
+
+class _Missing:
+    def __repr__(self) -> str:
+        return "(missing)"
+
+
+MISSING = _Missing()
 
 
 class Part(BaseModel):
@@ -75,7 +82,7 @@ class Part(BaseModel):
     def _explained(cls, error: Any) -> InitErrorDetails:
         """Turn pydantic's error into one whose message says what was expected, in terms of the scene file."""
         kind, where, words = error["type"], error["loc"], error.get("ctx", {})
-        expected, value, missing = error["msg"], error["input"], MISSING if kind in ("missing", MISSING) else OURS
+        expected, value = error["msg"], error["input"]
         if kind in _EXPECTED:
             expected = _EXPECTED[kind].format(**words)
             listed = re.findall("'([^']*)'", words.get("expected_tags", words.get("expected", "")))
@@ -88,9 +95,9 @@ class Part(BaseModel):
             field = cls.model_fields.get(str(where[0])) if len(where) == 1 else None
             expected = f"this field: {field.description}" if field else "one item more in this list"
         if kind.startswith("union_tag"):
-            where, missing = (*where, "kind"), MISSING if kind == "union_tag_not_found" else OURS
-            value = value.get("kind")
-        return InitErrorDetails(type=expectation(expected, missing), loc=where, input=value)
+            where, value = (*where, "kind"), value.get("kind")
+        value = MISSING if kind in ("missing", "union_tag_not_found") else value
+        return InitErrorDetails(type=expectation(expected), loc=where, input=value)
 
 
 KNOWN_FIELDS = "one of the known fields"
@@ -114,7 +121,6 @@ _EXPECTED = {
 }
 
 StandsAt = Callable[[Path, bool], tuple[int, int]]
-_ABSENT = object()
 
 
 def mistakes_of(failure: ValidationError, file: str, read: Any, place: StandsAt | None = None, inside: Path = ()
@@ -134,8 +140,9 @@ def mistakes_of(failure: ValidationError, file: str, read: Any, place: StandsAt 
             try:
                 here = here[key]
             except (KeyError, IndexError, TypeError):
-                here = _ABSENT
-        value = "(missing)" if error["type"] == MISSING else shown(error["input"]) + " (default)" * (here is _ABSENT)
+                here = MISSING
+        default = here is MISSING and error["input"] is not MISSING
+        value = shown(error["input"]) + (" (default)" if default else "")
         at = place(tuple(path), error["msg"].startswith(KNOWN_FIELDS)) if place else (0, 0)
         found.append(Mistake(file, *at, written(path), value, error["msg"]))
     return found

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.errors import ArgumentError, SceneError
@@ -257,7 +257,7 @@ def test_bodies_of_one_tree_stand_together() -> None:
     ("a: &x [1, *x]\n", 1, "levels"),
     ("? [1, 2]\n: 3\n", 1, "name of a field"),
     ("a: " + "[" * 100 + "]" * 100, 1, "levels"),
-    ("a: " + "[" * 50_000, 1, "levels"),
+    ("a: " + "[" * 50_000, 1, "YAML"),
     ("a: &a [" + "1, " * 400 + "1]\nb: &b [" + "*a, " * 400 + "*a]\nc: [" + "*b, " * 9 + "*b]\n", 1, "smaller"),
     ("#" * 1_000_001, 1, "at most 1000000"),
     *((text, 1, "mapping") for text in ("", "3\n", "[]\n", "just words\n", "~\n")),
@@ -315,49 +315,6 @@ def test_no_value_whatever_ends_in_another_error(values: dict[str, Any]) -> None
     except (SceneError, ArgumentError):
         return
     assert scene_from_text(changed.source_text).resolved() == changed.resolved()
-
-
-TEXTS = [find_scene(name).read_text().partition("name:")[2] for name in ("peg_corner", "two_link_arm_a", "wall_1d")]
-TOKENS = [
-    "~", "null", "true", "yes", ".nan", ".inf", "1e999", "-1", "0", "1e-400", "9" * 400, "0x1F", "1_0", "''", '"', "'",
-    "[]", "{}", "[[[[", "}", "]", "-", "- ", ":", ": ", "? ", "&a ", "*a", "*missing", "<<: *a", "!!float ", "!x ",
-    "!!python/object/apply:os.abort []", "!!binary aGk=", "|", ">", "|9", "%YAML 1.1", "---", "...", "#", "@", "`",
-    "\t", "\r", "\n", "\n\n  ", "\x00", "\x85", "\u2028", "\ufeff", "\ud7ff", "é", "\U0001f600", '"\\x"', '"\\uD800"',
-    "2001-01-01", "1:30", "world", "peg", "kind", "name", "box", "planar", "e" * 3000,
-]
-
-
-def damaged(text: str, kind: str, where: float, what: str, by: int) -> str:
-    """Return the text with one damage at a relative place."""
-    at, lines = int(where * len(text)), text.split("\n")
-    line = int(where * (len(lines) - 1))
-    match kind:
-        case "insert":
-            return f"{text[:at]}{what}{text[at:]}"
-        case "drop":
-            return text[:at] + text[at + abs(by) :]
-        case "cut":
-            return text[:at]
-        case "replace":  # the value of a line
-            lines[line] = f"{lines[line].partition(':')[0]}: {what}"
-        case "repeat":
-            lines.insert(line, lines[line])
-        case _:
-            lines[line] = " " * by + lines[line] if by > 0 else lines[line][-by:]
-    return "\n".join(lines)
-
-
-MUTATION = st.tuples(st.sampled_from(["insert", "drop", "cut", "replace", "repeat", "indent"]), st.floats(0.0, 1.0),
-                     st.sampled_from(TOKENS) | st.text(max_size=5), st.integers(-30, 3))
-
-
-@settings(max_examples=max(300, settings.default.max_examples))  # type: ignore[union-attr]
-@given(st.sampled_from(TEXTS), st.lists(MUTATION, min_size=1, max_size=4))
-def test_damaged_file_is_a_scene_or_a_scene_error(text: str, mutations: list[Any]) -> None:
-    text = "name:" + text
-    for mutation in mutations:
-        text = damaged(text, *mutation)
-    check(text)
 
 
 @given(st.text(alphabet=st.sampled_from("[]{}:,-?&*!|>'\"%@#~ \n\tab01.e"), max_size=60))
