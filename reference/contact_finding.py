@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.geometry import BOX, CIRCLE, HALF_PLANE, HALF_SPACE, SPHERE, Shapes
+from reference import Floats
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 ROUNDING = 1e-12  # share of the size within which points coincide
@@ -45,7 +45,8 @@ class Contacts(NamedTuple):
 
 def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origins: Floats, margin: float) -> Contacts:
     """Return the contacts with gap <= margin [m], for axes (n + 1, 3, 3), origins (n + 1, 3) of bodies and world."""
-    room = _room(shapes.kind, shapes.count, pairs)
+    first = pairs[:, 0]
+    room = 16 + int(np.where(shapes.kind[first] == BOX, 8, np.maximum(shapes.count[first], 2)).sum())
     ids, values = np.empty((room, 3), np.int64), np.empty((room, 7))
     corners, center, frames = _placed(shapes.kind, shapes.first, shapes.count, shapes.body, shapes.vertices,
                                       shapes.center, shapes.axes, axes, origins)  # fmt: skip
@@ -54,16 +55,6 @@ def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origin
     a, b = ids[:count, 0].astype(np.int32), ids[:count, 1].astype(np.int32)
     return Contacts(a, b, shapes.body[a], shapes.body[b], ids[:count, 2], values[:count, :3], values[:count, 3:6],
                     values[:count, 6])  # fmt: skip
-
-
-@numba.njit(cache=True, fastmath=False)
-def _room(kind, count, pairs):  # type: ignore[no-untyped-def]
-    """Return a capacity for all contacts, with room for a clipped face."""
-    room = 16
-    for k in range(len(pairs)):
-        a = pairs[k, 0]
-        room += 8 if kind[a] == BOX else max(count[a], 2)
-    return room
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -93,27 +84,23 @@ def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin
         a, b = pairs[k, 0], pairs[k, 1]
         ka, kb = kind[a], kind[b]
         pa, pb = corners[first[a] : first[a] + count[a]], corners[first[b] : first[b] + count[b]]
+        round_a, round_b = ka in (CIRCLE, SPHERE), kb in (CIRCLE, SPHERE)
+        x, y = pa[0] if ka == CIRCLE else center[a], pb[0] if kb == CIRCLE else center[b]
         if kb == HALF_PLANE:
             n = _points_on_plane(pa, radius[a], pb[0], pb[1], margin, ids, values, n)
         elif kb == HALF_SPACE:
             spread = np.zeros((1, 3)) if ka == SPHERE else _box_corners(axes[a], half[a])
-            n = _points_on_plane(center[a] + spread, radius[a], center[b], axes[b, :, 2].copy(), margin, ids, values, n)
-        elif ka == CIRCLE and kb == CIRCLE:
-            n = _balls(pa[0], radius[a], pb[0], radius[b], np.array([0.0, 1.0 if a < b else -1.0, 0.0]), margin, ids,
-                       values, n)  # fmt: skip
-        elif ka == SPHERE and kb == SPHERE:
-            n = _balls(center[a], radius[a], center[b], radius[b], np.array([0.0, 0.0, 1.0 if a < b else -1.0]), margin,
-                       ids, values, n)  # fmt: skip
-        elif ka == CIRCLE:
-            n = _ball_on(_nearest_on_polygon(pb, pa[0]), pa[0], radius[a], 1.0, margin, ids, values, n)
-        elif kb == CIRCLE:
-            n = _ball_on(_nearest_on_polygon(pa, pb[0]), pb[0], radius[b], -1.0, margin, ids, values, n)
-        elif ka == SPHERE:
-            nearest = _nearest_on_box(center[b], axes[b], half[b], center[a])
-            n = _ball_on(nearest, center[a], radius[a], 1.0, margin, ids, values, n)
-        elif kb == SPHERE:
-            nearest = _nearest_on_box(center[a], axes[a], half[a], center[b])
-            n = _ball_on(nearest, center[b], radius[b], -1.0, margin, ids, values, n)
+            n = _points_on_plane(x + spread, radius[a], y, axes[b, :, 2].copy(), margin, ids, values, n)
+        elif round_a and round_b:
+            otherwise = np.zeros(3)
+            otherwise[1 if ka == CIRCLE else 2] = 1.0 if a < b else -1.0
+            n = _balls(x, radius[a], y, radius[b], otherwise, margin, ids, values, n)
+        elif round_a:
+            nearest = _nearest_on_polygon(pb, x) if ka == CIRCLE else _nearest_on_box(y, axes[b], half[b], x)
+            n = _ball_on(nearest, x, radius[a], 1.0, margin, ids, values, n)
+        elif round_b:
+            nearest = _nearest_on_polygon(pa, y) if kb == CIRCLE else _nearest_on_box(x, axes[a], half[a], y)
+            n = _ball_on(nearest, y, radius[b], -1.0, margin, ids, values, n)
         elif ka == BOX:
             n = _boxes(center[a], axes[a], half[a], center[b], axes[b], half[b], margin, ids, values, n)
         else:
@@ -239,12 +226,9 @@ def _box_corners(axes, half):  # type: ignore[no-untyped-def]
     """Return the corners (8, 3) relative to the centre."""
     corners = np.empty((8, 3))
     for i in range(8):
+        along, up, out = (1 - 2 * (i & 1)) * half[0], (1 - (i & 2)) * half[1], (1 - (i & 4) // 2) * half[2]
         for x in range(3):
-            corners[i, x] = (
-                (1 - 2 * (i & 1)) * half[0] * axes[x, 0]
-                + (1 - (i & 2)) * half[1] * axes[x, 1]
-                + (1 - (i & 4) // 2) * half[2] * axes[x, 2]
-            )
+            corners[i, x] = along * axes[x, 0] + up * axes[x, 1] + out * axes[x, 2]
     return corners
 
 
@@ -409,8 +393,10 @@ def _clipped_face(center, axes, half, face, center_o, axes_o, half_o, sign, sepa
         length = _cut(patch, lines, length, border // 2, 1.0 - 2.0 * (border % 2), limit, border)
     start, faces = n, (2 * face + int(outward)) * 6 + 2 * facing + int(side > 0.0)
     for c in range(length):
-        gap = patch[c, 2]
-        if gap <= margin and not _doubled(patch, c, length, ROUNDING * (half.sum() + half_o.sum())):
+        gap, nearest = patch[c, 2], np.inf  # to an earlier corner, which can lie at the same place
+        for i in range(c):
+            nearest = min(nearest, np.abs(patch[i] - patch[c]).max())
+        if gap <= margin and nearest > ROUNDING * (half.sum() + half_o.sum()):
             low, high = min(lines[c, 0], lines[c, 1]), max(lines[c, 0], lines[c, 1])
             feature = _feature(0 if sign > 0.0 else 1, faces, 10 * low + high)
             point = center + half[face] * m + patch[c, 0] * u + patch[c, 1] * w + 0.5 * gap * m
@@ -439,15 +425,6 @@ def _cut(patch, lines, length, axis, sign, limit, border):  # type: ignore[no-un
             lines[found, 0], lines[found, 1] = (shared, 4 + border) if before < 0.0 else (4 + border, shared)
             found += 1
     return found
-
-
-@numba.njit(cache=True, fastmath=False)
-def _doubled(patch, c, length, share):  # type: ignore[no-untyped-def]
-    """Return whether an earlier corner lies at the same place."""
-    nearest = np.inf
-    for i in range(c):
-        nearest = min(nearest, np.abs(patch[i] - patch[c]).max())
-    return nearest <= share
 
 
 @numba.njit(cache=True, fastmath=False)

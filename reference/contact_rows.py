@@ -12,13 +12,11 @@ from weakref import WeakKeyDictionary
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.mechanics.mechanism import Mechanism
+from reference import Floats
 from reference.contact_finding import Contacts, find_contacts
 from reference.rigid_body import PinocchioMechanism, model_of
-
-Floats = NDArray[np.float64]
 
 # An nᵀJ below this share of its summands is rounding error, not a lever arm of the contact.
 ROW_NOISE = 1e-13
@@ -147,45 +145,23 @@ def cross(a: Floats, b: Floats) -> Floats:
     return found
 
 
-def write_contacts(
-    state: Any, found: ContactRows, blow: Floats, pushed: Floats, friction: Floats, dt: float
-) -> None:
+def write_contacts(state: Any, found: ContactRows, blow: Floats, pushed: Floats, friction: Floats, dt: float) -> None:
     """Record in `state` the contacts that touch or carry an impulse.
 
     blow, pushed : (c,) impulses [N s]; `pushed` is recorded as forces
     friction : (c, 3) tangential impulses in world axes, recorded as forces
     """
-    into = state.contacts
-    _write(into.shape_a, into.shape_b, into.feature, into.body_a, into.body_b, into.point, into.normal, into.gap,
-           into.is_new, into.normal_velocity, into.normal_force, into.friction_force, state.contact_impulse,
-           state.contact_count, *found.geometry, found.gamma, blow, pushed, friction, dt)  # fmt: skip
-
-
-@numba.njit(cache=True, fastmath=False)
-def _write(  # type: ignore[no-untyped-def]
-    into_a, into_b, into_feature, into_body_a, into_body_b, into_point, into_normal, into_gap, is_new, normal_velocity,
-    normal_force, friction_force, into_blow, contact_count, shape_a, shape_b, body_a, body_b, feature, point, normal,
-    gap, gamma, blow, pushed, friction, dt,
-):  # fmt: skip
-    before, count = contact_count[0], 0
-    old_a, old_b, old_feature = into_a[:before].copy(), into_b[:before].copy(), into_feature[:before].copy()
-    for c in range(len(gap)):
-        if gap[c] > 0.0 and not (blow[c] > 0.0 or pushed[c] > 0.0):
-            continue
-        new = True
-        for k in range(before):
-            if old_a[k] == shape_a[c] and old_b[k] == shape_b[c] and old_feature[k] == feature[c]:
-                new = False
-        into_a[count], into_b[count], into_feature[count] = shape_a[c], shape_b[c], feature[c]
-        into_body_a[count], into_body_b[count], into_gap[count] = body_a[c], body_b[c], gap[c]
-        is_new[count], normal_velocity[count] = new, gamma[c]
-        normal_force[count] = pushed[c] / dt
-        into_blow[count] = blow[c]
-        for i in range(3):
-            into_point[count, i], into_normal[count, i] = point[c, i], normal[c, i]
-            friction_force[count, i] = friction[c, i] / dt
-        count += 1
-    contact_count[1], contact_count[0] = before, count
+    into, geometry, before = state.contacts, found.geometry, int(state.contact_count[0])
+    old = {*zip(*(getattr(into, name)[:before].tolist() for name in ("shape_a", "shape_b", "feature")), strict=True)}
+    kept = np.flatnonzero(~(found.gap > 0.0) | (blow > 0.0) | (pushed > 0.0))
+    columns = {**geometry._asdict(), "normal_velocity": found.gamma, "normal_force": pushed / dt,
+               "friction_force": friction / dt}  # fmt: skip
+    for name, column in columns.items():
+        getattr(into, name)[: len(kept)] = column[kept]
+    names = zip(geometry.shape_a[kept], geometry.shape_b[kept], geometry.feature[kept], strict=True)
+    into.is_new[: len(kept)] = [name not in old for name in names]
+    state.contact_impulse[: len(kept)] = blow[kept]
+    state.contact_count[:] = len(kept), before
 
 
 def write_impact(state: Any, system: Any, v: Floats, mass: Floats, impulse: Floats, rows: Floats) -> None:
@@ -200,9 +176,3 @@ def write_impact(state: Any, system: Any, v: Floats, mass: Floats, impulse: Floa
     log.v_minus[0], log.v_plus[0], log.impulse[0] = v, v + change, impulse
     log.energy_lost[0] = -float((v + 0.5 * change) @ impulse)
     log.logged[0] = 1
-
-
-def identities(contacts: Any, rows: Any) -> list[tuple[int, int, int]]:
-    """Return the identity of the contact of each row: its two shapes and their features."""
-    first, second, feature = contacts.shape_a, contacts.shape_b, contacts.feature
-    return [(int(first[i]), int(second[i]), int(feature[i])) for i in rows]

@@ -17,13 +17,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, MissingDependencyError
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.fclib import LARGEST_SIZE, DatasetError, StoredProblem, read_fclib
-
-Floats = NDArray[np.float64]
 
 _LARGEST_TEXT = 64 << 20  # unpacked bytes, enough for 2,500 unknowns; a small gzip file can unpack to any size
 

@@ -14,14 +14,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
+from reference import Floats
 from reference.complementarity.laws import Outcome, newton_lcp
 from reference.complementarity.problem import ImpactProblem
 from reference.rigid_step import nearest_velocity
-
-Floats = NDArray[np.float64]
 
 # Gaps and speeds at an event have the rounding error of a parabola's root, 1e-16 relative; the tolerances are larger.
 _CLOSED = 1e-11  # of the largest coordinate: a gap below this is closed

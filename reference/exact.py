@@ -20,12 +20,12 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
 from iapb.lazy import needed
+from reference import Floats
 
-Floats = NDArray[np.float64]
 Rational = Any  # flint.fmpq_mat; named here because flint is imported only when used
 
 _SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose products are exact

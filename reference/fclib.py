@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, IapbError
 from iapb.lazy import needed
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.hdf5 import leads_out
-
-Floats = NDArray[np.float64]
 
 LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
 LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only

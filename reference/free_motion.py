@@ -17,12 +17,10 @@ Body Dynamics Algorithms (2008), chapter 7.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import SolverError
+from reference import Floats
 from reference.rigid_body import PinocchioMechanism
-
-Floats = NDArray[np.float64]
 
 # Share of |q| or |v| that a substep may err by: twenty roundings.
 _ACCURACY = 20.0 * float(np.finfo(np.float64).eps)

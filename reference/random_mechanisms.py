@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-
-Floats = NDArray[np.float64]
+from reference import Floats
 
 # Masses [kg] and radii of gyration [m] span these decades. A flat or rod-like body has a nearly singular inertia:
 # its second moments of mass go down to this share.

@@ -34,17 +34,15 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.names import one_of
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import SOLVED_TOLERANCE, Solution
 from reference.complementarity.solvers import solve
 from reference.complementarity.solvers.qp import daqp, quadprog
 from reference.complementarity.solvers.sweeps import projected_sweeps
-
-Floats = NDArray[np.float64]
 
 # Active-set solutions have errors of a few hundred roundings of the velocities; a larger error means a wrong set.
 STEP_TOLERANCE = 1e-10

@@ -27,23 +27,22 @@ bounces, are the `bound` of the result. It is an estimate, not a certified enclo
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene
-from iapb.scene.mechanism import restitutions_of
 from iapb.system import System, wrenches_of
+from reference import Floats
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
 from reference.contact_rows import find_rows, mechanics_of
 from reference.rigid_body import PinocchioMechanism, model_of
 from reference.rigid_step import nearest_velocity
 
-Floats = NDArray[np.float64]
 Contact = tuple[int, int, int]
 
 
@@ -78,9 +77,7 @@ _AT_ONCE = 100  # most impacts at one instant: Newton's law can leave contacts t
 class Bound(NamedTuple):
     """Error estimate of the motion: the largest differences between the computations plus the integrator's accuracy.
 
-    position : error of q, plus the largest gap that counted as closed and the neglected bounces [m, rad]
-    velocity : error of v between equal events, plus the neglected bounces averaged over time [m/s, rad/s]
-    instant : error of the event times [s]
+    Position [m, rad] and velocity [m/s, rad/s] include the neglected bounces; instant [s] is that of the events.
     """
 
     position: float
@@ -110,10 +107,8 @@ class SceneTruth:
 
     def state(self, time: Floats) -> tuple[Floats, Floats]:
         """Return q and v (n, d) at the times (n,); at the instant of an event, those after it."""
-        starts = np.array([start for start, _, _ in self.segments])
-        found = np.array([
-            self.segments[max(0, int(np.searchsorted(starts, t, side="right")) - 1)][2](float(t)) for t in time
-        ])  # fmt: skip
+        at = np.searchsorted([start for start, _, _ in self.segments], time, side="right") - 1
+        found = np.array([self.segments[max(0, k)][2](float(t)) for k, t in zip(at, time, strict=True)])
         nq = self.coordinates
         return found[:, :nq], found[:, nq : nq + self.velocities]
 
@@ -128,40 +123,32 @@ class _Here(NamedTuple):
     drift: Floats
 
 
-@dataclass
 class _Motion:
     """The scene's equations of motion. `held` are the lasting contacts of this segment; `leaving` have just opened."""
 
-    scene: Scene
-    coupled: bool
-    tolerances: Tolerances
-    duration: float
-    system: System = field(init=False)
-    restitution: float = field(init=False)
-    widest: float = 0.0  # largest gap [m] that counted as closed in an impact
-    bounced: float = 0.0  # path [m] of the neglected bounces
-    flight: float = np.inf  # least time [s] for which a contact that has just opened stays open
-    held: list[Contact] = field(default_factory=list)
-    leaving: list[Contact] = field(default_factory=list)
+    widest = 0.0  # largest gap [m] that counted as closed in an impact
+    bounced = 0.0  # path [m] of the neglected bounces
+    flight = np.inf  # least time [s] for which a contact that has just opened stays open
 
-    def __post_init__(self) -> None:
-        self.system = System(self.scene)
-        if self.scene.hand is not None and self.scene.hand.changes:
-            raise ArgumentError("scene", self.scene.name, "a scene whose hand's force does not change over time")
-        mechanism = self.system.mechanism
-        self.mechanics = mechanics_of(self.system)
-        if self.coupled and mechanism.nq != mechanism.nv:
-            raise ArgumentError("scene", self.scene.name, "a scene without quaternions, or no coupling")
-        self.d, self.nq = mechanism.nv, mechanism.nq
-        values = restitutions_of(self.scene, self.system.pairs)
+    def __init__(self, scene: Scene, coupled: bool, tolerances: Tolerances, duration: float) -> None:
+        self.scene, self.coupled, self.tolerances, self.duration = scene, coupled, tolerances, duration
+        self.system, self.held, self.leaving = System(scene), list[Contact](), list[Contact]()
+        mechanism, self.gains = self.system.mechanism, cast(Any, scene.couplings.four_channel)
+        if scene.hand is not None and scene.hand.changes:
+            raise ArgumentError("scene", scene.name, "a scene whose hand's force does not change over time")
+        if coupled and mechanism.nq != mechanism.nv:
+            raise ArgumentError("scene", scene.name, "a scene without quaternions, or no coupling")
+        if coupled and self.gains is None:
+            raise ArgumentError("scene", scene.name, "a scene with couplings.four_channel")
+        self.mechanics, self.d, self.nq = mechanics_of(self.system), mechanism.nv, mechanism.nq
+        values = self.system.restitutions
         if len(values) > 1:
             found = f"one restitution for all contacts; here {values[0]:g} to {values[-1]:g}"
-            raise ArgumentError("scene", self.scene.name, found)
-        self.restitution = float(values[0]) if len(values) else self.scene.contact.restitution
+            raise ArgumentError("scene", scene.name, found)
+        self.restitution = float(values[0]) if len(values) else scene.contact.restitution
         self.tool = slice(*self.system.tool_dofs)
-        self.device = model_of(self.system.device_mechanism()) if self.coupled else None
-        settings = self.scene.device
-        self.drag = np.asarray(settings.damping if settings is not None and settings.damping else 0.0)
+        self.device = model_of(self.system.device_mechanism()) if coupled else None
+        self.drag = np.asarray(scene.device.damping if scene.device is not None and scene.device.damping else 0.0)
 
     def split(self, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Return q, v, device q, device v of a state, with q normalised."""
@@ -187,10 +174,7 @@ class _Motion:
         return np.asarray(mechanics.point_jacobian(q, hand.body, point).T @ wrench[:3] + turning, np.float64)
 
     def _pull(self, distance: Floats, speed: Floats) -> Floats:
-        gains = self.scene.couplings.four_channel
-        if gains is None:
-            raise ArgumentError("scene", self.scene.name, "a scene with couplings.four_channel")
-        return np.asarray(gains.stiffness) * distance + np.asarray(gains.damping) * speed
+        return np.asarray(self.gains.stiffness) * distance + np.asarray(self.gains.damping) * speed
 
     def _here(self, state: Floats, names: list[Contact]) -> _Here:
         """Return dynamics and rows of the named contacts in a state, with J̇v by fourth-order differences."""

@@ -19,6 +19,7 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene.mechanism import restitution_by_pair
+from reference import Floats
 from reference.contact_rows import (
     ContactRows,
     find_rows,
@@ -30,8 +31,6 @@ from reference.contact_rows import (
 from reference.free_motion import free_motion
 from reference.one_thread import one_thread
 from reference.rigid_step import FRICTION_LAWS, SCHEMES, friction_step, rigid_step, velocity_bounds
-
-Floats = NDArray[np.float64]
 
 # Entries of J in one step, which then takes 4 GB and about 15 s. 320 circles on a floor reach this limit.
 MOST_ENTRIES = 50_000_000

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError, SolverError
-
-Floats = NDArray[np.float64]
+from reference import Floats
 
 # Residual, as a share of |L⁻¹ Jᵀp|, below which a non-negative impulse exists: the active-set least squares ends near
 # 1e-13 for a consistent problem and far above for an inconsistent one.

@@ -9,14 +9,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import MissingDependencyError
+from reference import Floats
 from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
 from reference.complementarity.solution import SOLVED_TOLERANCE, Residuals, Solution, velocity_scale
 from reference.complementarity.solvers import solve, solver_names
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError, SolverError
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import velocity_scale
 from reference.complementarity.solvers import solve
-
-Floats = NDArray[np.float64]
 
 # A solution of a law's LCP with a residual above this share of the velocity scale raises an error.
 LAW_TOLERANCE = 1e-9

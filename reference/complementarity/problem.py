@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from iapb.errors import ArgumentError, SolverError
-
-Floats = NDArray[np.float64]
+from reference import Floats
 
 # Rounding of n products leaves an asymmetry of n·eps, files with 12 digits 1e-11; above this tolerance the
 # matrix itself is asymmetric.

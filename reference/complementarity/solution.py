@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
-
-Floats = NDArray[np.float64]
 
 # First-order solvers (OSQP, SCS, proxqp) reach about 1e-6 of the velocity scale, pivoting solvers 1e-12.
 SOLVED_TOLERANCE = 1e-6

@@ -15,12 +15,11 @@ from math import cos, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
+from reference import Floats
 
-Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import SolverError
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, residuals
-
-Floats = NDArray[np.float64]
 
 LARGEST_SIZE = 14  # 16384 active sets, some of them linear programs: seconds
 _SAME = 1e-9  # two solutions closer than this share of the larger one count as one

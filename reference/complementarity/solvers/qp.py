@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import SolverError
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
-
-Floats = NDArray[np.float64]
 
 _INEQUALITY, _EQUALITY = 0, 5  # daqp's `sense` of a row
 _ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import SolverError
+from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
-
-Floats = NDArray[np.float64]
 
 _SWEEPS = 20_000
 _WORK = 1e9  # multiplications, about 2 s: larger frictionless problems get fewer sweeps, but at least _LEAST_SWEEPS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,7 @@ from hypothesis import strategies as st
 
 from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, solver_names
 from reference.complementarity.solution import project_on_cone
-from reference.complementarity.solvers import newton_cones
-from reference.datasets import problem_files, read_problem
+from reference.datasets import read_problem
 from reference.one_thread import one_thread
 
 PROBLEMS = Path(__file__).parents[4] / "shared" / "problems"
@@ -37,14 +37,6 @@ def test_a_mass_sticks_or_slides_as_coulomb_says(solver: str) -> None:
     assert slides.velocity_plus == pytest.approx([0.0, 2.7, 3.6], abs=1e-6)
 
 
-@pytest.mark.parametrize(("gamma", "solved"), [((1.0, 0.0, 0.0), True), ((0.0, 0.0, 0.0), True),
-                                               ((-1.0, 0.0, 0.0), False)])  # fmt: skip
-def test_newton_gives_no_impulse_where_none_can_act(gamma: tuple[float, ...], solved: bool) -> None:
-    problem = ImpactProblem(np.zeros((3, 3)), np.array(gamma), np.zeros(1), np.array([0.5]), contact_size=3)
-    solution = newton_cones.solve(problem)  # `solve` knows some of these without a solver
-    assert not solution.impulse.any() and Solution(problem, solution.impulse).solved() == solved
-
-
 RELAXED_SOLVERS = ("nsgs", "newton_cones", "cvxpy_socp", "pinocchio_admm")
 
 
@@ -61,22 +53,14 @@ def test_the_relaxed_law_lifts_off_where_it_slides(solver: str) -> None:
 def test_solvers_agree_on_random_problems(relaxed: bool) -> None:
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        k = int(rng.integers(1, 4))
-        root = rng.normal(size=(6, 6))
-        problem = ImpactProblem.from_impact(
-            root @ root.T + np.eye(6),
-            rng.normal(size=(3 * k, 6)),
-            rng.normal(size=6),
-            0.2,
-            0.3,
-            relaxed=relaxed,
-        )
+        root, rows = rng.normal(size=(6, 6)), rng.normal(size=(3 * int(rng.integers(1, 4)), 6))
+        problem = ImpactProblem.from_impact(root @ root.T + np.eye(6), rows, rng.normal(size=6), 0.2, 0.3,
+                                            relaxed=relaxed)  # fmt: skip
         solutions = [solve(problem, name) for name in (RELAXED_SOLVERS if relaxed else CONE_SOLVERS)]
         for solution in solutions:
             assert solution.solved(1e-5), (seed, solution.solver, solution.note, solution.residuals)
-        if relaxed:  # convex: one velocity; Coulomb's law may have several
-            first, *others = (solution.velocity_plus for solution in solutions)
-            assert all(np.abs(first - other).max() <= 1e-5 for other in others)
+            if relaxed:  # convex: one velocity; Coulomb's law may have several
+                assert np.abs(solution.velocity_plus - solutions[0].velocity_plus).max() <= 1e-5
 
 
 def test_relaxed_and_coulomb_answers_are_not_taken_for_each_other() -> None:
@@ -169,32 +153,27 @@ def test_joints_are_as_if_their_coordinates_were_eliminated(relaxed: bool) -> No
 
 
 # --- large hyperstatic problems -----------------------------------------------------------------------------------
-def brick_wall(layers: int = 5, bricks: int = 8, mu: float = 0.8, seed: int = 2) -> ImpactProblem:
+def brick_wall(layers: int = 5, bricks: int = 8) -> ImpactProblem:
     """A wall of bricks 2 x 1 x 1 in running bond, masses over two decades, one step of gravity: four corners a face.
 
     Eight and seven bricks by turns make 256 contacts (768 unknowns) of rank 228, as the stacks and towers of FCLIB.
     """
-    size, rng = np.array([2.0, 1.0, 1.0]), np.random.default_rng(seed)
-    layer = np.array([k for k in range(layers) for _ in range(bricks - k % 2)])
     middle = np.array([[2.0 * i + k % 2, 0.0, k + 0.5] for k in range(layers) for i in range(bricks - k % 2)])
-    count, rows = len(layer), []
-    for a in range(count):
-        below = [b for b in range(count) if layer[b] == layer[a] - 1 and abs(middle[b, 0] - middle[a, 0]) < 2.0]
-        for b in below or [-1]:
-            other = middle[b, 0] if b >= 0 else middle[a, 0]
-            for x in (max(middle[a, 0], other) - 1.0, min(middle[a, 0], other) + 1.0):
-                for y in (-0.5, 0.5):
-                    for way in np.roll(np.eye(3), 1, axis=0):  # up, then along the wall and across
-                        row, point = np.zeros((count, 6)), np.array([x, y, float(layer[a])])
-                        for body, sign in ((a, 1.0), (b, -1.0)):
-                            if body >= 0:
-                                row[body] = sign * np.concatenate([way, np.cross(point - middle[body], way)])
-                        rows.append(row.ravel())
-    mass = 2.0 * 10.0 ** rng.uniform(-1.0, 1.0, count)
-    inertia = np.array([size[1] ** 2 + size[2] ** 2, size[0] ** 2 + size[2] ** 2, size[0] ** 2 + size[1] ** 2]) / 12.0
-    diagonal = np.concatenate([m * np.concatenate([np.ones(3), inertia]) for m in mass])
+    count, rows = len(middle), []
+    for a, (x, _, z) in enumerate(middle):
+        below = [b for b in range(count) if middle[b, 2] == z - 1.0 and abs(middle[b, 0] - x) < 2.0] or [-1]
+        for b in below:
+            other = middle[b, 0] if b >= 0 else x
+            for corner in product((max(x, other) - 1.0, min(x, other) + 1.0), (-0.5, 0.5)):
+                for way in np.roll(np.eye(3), 1, axis=0):  # up, then along the wall and across
+                    row, point = np.zeros((count, 6)), np.array([*corner, z - 0.5])
+                    for body, sign in ((a, 1.0), (b, -1.0))[: 1 + (b >= 0)]:
+                        row[body] = sign * np.concatenate([way, np.cross(point - middle[body], way)])
+                    rows.append(row.ravel())
+    mass = 2.0 * 10.0 ** np.random.default_rng(2).uniform(-1.0, 1.0, count)
+    diagonal = np.outer(mass, [1.0, 1.0, 1.0, 2.0 / 12.0, 5.0 / 12.0, 5.0 / 12.0]).ravel()
     velocity = np.tile([0.0, 0.0, -0.0981, 0.0, 0.0, 0.0], count)
-    return ImpactProblem.from_impact(np.diag(diagonal), np.array(rows), velocity, 0.0, mu, name="brick wall")
+    return ImpactProblem.from_impact(np.diag(diagonal), np.array(rows), velocity, 0.0, 0.8, name="brick wall")
 
 
 def test_a_wall_of_768_unknowns_is_solved_by_two() -> None:
@@ -208,22 +187,6 @@ def test_a_wall_of_768_unknowns_is_solved_by_two() -> None:
     assert cone.solved(1e-4), (cone.note, cone.residuals)
     for solution in (newton, admm, cone):
         assert np.abs(solution.velocity_plus).max() <= 1e-4 * 0.0981
-
-
-LARGE = 700  # unknowns of the stored problems that one solver alone had solved
-
-
-def test_large_stored_problems_are_solved_to_rounding() -> None:
-    """Files of FCLIB with 768 and 858 unknowns, where they are at hand; smaller ones are in the comparison's table."""
-    files = problem_files(PROBLEMS) if PROBLEMS.exists() else []
-    stored = [read_problem(path).problem for path in files if path.suffix in (".hdf5", ".h5")]
-    large = [problem for problem in stored if problem.size >= LARGE]
-    if not large:
-        pytest.skip("no shared problem file of 700 unknowns or more is here")
-    with one_thread():
-        for problem in large:
-            solution = solve(problem, "newton_cones")
-            assert solution.solved(1e-8), (problem.name, solution.note, solution.residuals)
 
 
 @pytest.mark.skipif(not PROBLEMS.exists(), reason="shared problem files are not here")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from iapb.contact.kernels.resolve import separates
 from iapb.errors import ArgumentError, SolverError
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.adhesion import ADHESIVE, ARTEFACT, NONE, adhesion, nonnegative_impulse
-from reference.complementarity.laws import LAWS, newton_equality, newton_lcp, per_body_rows, poisson
+from reference.complementarity.laws import newton_equality, newton_lcp, per_body_rows, poisson
 from reference.complementarity.solvers import qp
 from reference.datasets import read_problem
 from reference.event_driven import LinearSystem, event_driven
@@ -58,9 +59,7 @@ def test_one_contact_all_laws_agree(seed: int, e: float) -> None:
 
 @given(st.integers(0, 100_000), st.floats(0.0, 1.0))
 def test_equality_is_the_complementarity_solution_exactly_where_it_need_not_pull(seed: int, e: float) -> None:
-    """The wider class of C05: one e for all, and *some* p >= 0 gives the equality's motion. Then gamma_plus
-    = −e gamma_minus is complementary to that p, and velocities of the LCP are unique. Otherwise they differ.
-    """
+    """The wider class of C05: one e, and *some* p >= 0 gives the equality's motion, which then solves the LCP."""
     problem = random_problem(seed, 1 + seed % 8, e)
     rows, mass = problem.contact_jacobian, problem.mass_matrix
     equality = newton_equality(problem)
@@ -74,16 +73,11 @@ def test_equality_is_the_complementarity_solution_exactly_where_it_need_not_pull
 
 @given(st.integers(0, 100_000))
 def test_sound_laws_never_gain_energy_with_unequal_restitution(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    contacts = int(rng.integers(1, 6))
-    problem = random_problem(seed, contacts, rng.uniform(size=contacts))
-    for law in (poisson, newton_lcp):
-        try:
-            outcome = law(problem)
-        except SolverError:
-            assert law is newton_lcp  # its velocities can be infeasible; Poisson always has a solution
-            continue
-        assert gain(problem, outcome.velocity) <= 1e-11
+    contacts = 1 + seed % 5
+    problem = random_problem(seed, contacts, np.random.default_rng(seed).uniform(size=contacts))
+    assert gain(problem, poisson(problem).velocity) <= 1e-11
+    with suppress(SolverError):  # Newton's velocities can be infeasible; Poisson always has a solution
+        assert gain(problem, newton_lcp(problem).velocity) <= 1e-11
 
 
 def test_unequal_equalities_on_the_bar_gain_energy_and_sound_laws_do_not() -> None:
@@ -124,16 +118,6 @@ def test_adhesion_is_told_from_an_artefact() -> None:
     assert adhesion(rows[:2], [1.0, -0.5], np.eye(2)) == ADHESIVE
 
 
-def cycling(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let daqp end as it does on some redundant rows."""
-
-    def cycle(*_: object) -> np.ndarray:
-        raise SolverError("daqp: exit flag -2")
-
-    monkeypatch.setattr(qp, "daqp", cycle)
-    monkeypatch.setitem(STEP_SOLVERS, "daqp", cycle)
-
-
 def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
     """The Newton LCP, Poisson, steps and event-driven motions ask other solvers, and say so where none is left."""
     problem = random_problem(7, 8, 0.5)
@@ -144,8 +128,12 @@ def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch)
         return [newton_lcp(problem).velocity, poisson(problem).velocity, step.velocity,
                 event_driven(row, [0.0, 0.5], [1.0, 0.0], 1.2).v[-1]]  # fmt: skip
 
+    def cycle(*_: object) -> np.ndarray:
+        raise SolverError("daqp: exit flag -2")
+
     usual = outcomes()
-    cycling(monkeypatch)
+    monkeypatch.setattr(qp, "daqp", cycle)
+    monkeypatch.setitem(STEP_SOLVERS, "daqp", cycle)
     assert all(found == pytest.approx(expected, abs=1e-9) for found, expected in zip(outcomes(), usual, strict=True))
     with pytest.raises(SolverError, match="exit flag -2"):
         newton_lcp(problem, "daqp")
@@ -167,8 +155,7 @@ def test_rows_that_depend_up_to_rounding_get_no_impulse_from_noise(condition: fl
     """Twice the same rows on an ill-conditioned M: the impulses of each pair are equal, as least norm says."""
     rng = np.random.default_rng(3)
     axes, _ = np.linalg.qr(rng.normal(size=(6, 6)))
-    mass = axes @ np.diag(np.geomspace(1.0, condition, 6)) @ axes.T
-    rows = rng.normal(size=(3, 6))
+    mass, rows = axes @ np.diag(np.geomspace(1.0, condition, 6)) @ axes.T, rng.normal(size=(3, 6))
     both = np.vstack([rows, rows @ axes @ axes.T])  # the same up to rounding
     problem = ImpactProblem.from_impact(0.5 * (mass + mass.T), both, rng.normal(size=6), 0.5)
     p = newton_equality(problem).impulse
@@ -192,13 +179,6 @@ def test_the_engines_pushing_method_is_the_newton_lcp(seed: int, e: float) -> No
         resolve_impact(*impact, -0.5, method="poisson")
 
 
-def test_the_engine_says_where_rows_that_oppose_each_other_are_not_solved() -> None:
-    rows = np.array([[-0.5, -1.5, -0.4], [-0.5, 0.1, 1.6], [0.5000775, 1.4999845, 0.399752]])
-    found = resolve_impact(np.eye(3), rows, [0.7, -0.1, -0.2], 0.5, method="poisson")
-    assert (rows @ found.velocity >= -1e-6).all() or found.status == "not solved"
-    assert found.energy_change <= 0.0
-
-
 @pytest.mark.parametrize(("closing", "separate"), [(1.1e-6, False), (0.9e-6, True)])
 def test_a_contact_left_closing_is_noticed_from_a_millionth_of_the_speed_on(closing: float, separate: bool) -> None:
     work = make_impact_work(2, 1)
@@ -215,11 +195,6 @@ def test_rows_that_separate_stay_apart_or_the_status_says_so(seed: int, e: float
     found = resolve_impact(np.eye(d), rows, v, e, method="poisson")
     closing = float((rows @ found.velocity).min()) < -2e-6 * np.linalg.norm(rows, axis=1).max() * np.linalg.norm(v)
     assert found.impulses.min() >= 0.0 and (found.status == "not solved") >= closing
-
-
-def test_every_law_says_what_it_is() -> None:
-    for name, law in LAWS.items():
-        assert law.name == name and law.statement and law.source and law.hypotheses
 
 
 def test_poissons_law_on_dependent_rows_of_both_signs() -> None:

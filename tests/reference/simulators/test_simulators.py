@@ -10,7 +10,6 @@ import pytest
 
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
-from reference.simulators.scene import after_all_collisions
 from reference.simulators.simulator import damping_for, spring_restitution, viscous_dissipation_for
 from reference.simulators.trajectory import Trajectory, deepest_overlap
 
@@ -43,13 +42,6 @@ def test_truth_of_every_impact_scene_keeps_its_energy(name):
     assert after == pytest.approx(scene.restitution**2 * before, rel=1e-14)
     if not scene.obstacles:
         np.testing.assert_allclose(scene.masses @ end, scene.masses @ start, atol=1e-15)
-
-
-def test_collisions_of_two_balls_and_a_wall_end_when_nothing_approaches():
-    heavy, light = after_all_collisions(1.0)
-    assert (heavy, light) == (-1.0, 0.0)  # equal balls: it comes back through the light one
-    heavy, light = after_all_collisions(100.0)
-    assert heavy <= light <= 0.0
 
 
 @pytest.mark.parametrize("name", ["iapb", "rigid", "pinocchio", "siconos"])

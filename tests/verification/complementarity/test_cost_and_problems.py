@@ -57,7 +57,7 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     assert dict(study.lines[1].verdicts)["lemke"] == "solved"
     text = " ".join(part.sentence for part in problems(study))
     assert "1 files not" in text and "skew.lcp" in text
-    assert "Files not readable: damaged.lcp: 3 numbers, expected 13" in text
+    assert "Files not readable: damaged.lcp: cannot be read: size 3 with 2 numbers" in text
     assert all(share.shape == FACTORS.shape and (np.diff(share) >= 0.0).all() for _, _, share in study.profile)
     with pytest.raises(ArgumentError, match="folder"):
         study_problems(tmp_path / "nowhere")

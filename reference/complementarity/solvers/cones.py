@@ -1,24 +1,29 @@
-"""Semismooth Newton on Coulomb's cones with an ADMM start, for contacts with friction and for joints.
+"""Contacts with friction and joints on Coulomb's cones: semismooth Newton with an ADMM start, and cone programs.
 
 ADMM minimises  ½ pᵀWp + (b + s)ᵀp  over the cones, with the shift s = mu |u_T| of Coulomb's law from the last iterate
 (none if relaxed). One eigendecomposition of W serves every penalty rho, which is adapted to the residuals. Newton's
 steps solve the natural map F(p) = p − proj_K(p − w) = 0, with F = w for joints. They use least squares of least norm,
 because W is singular for redundant contacts. The Newton result with the smallest F is returned.
 Source: Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991); Carpentier, Montaut, Le Lidec, RSS (2024).
+
+The cone program (cvxpy with Clarabel) is the relaxed law,  min ½|Aᵀp|² + bᵀp  over the cones. Coulomb's law is that
+program with the shift added to the normal part of b. The shift depends on the solution, so the program is solved
+repeatedly until the shift is constant (convergence is not guaranteed).
+Source: Anitescu and Tasora, Comput. Optim. Appl. 47 (2010); Acary, Cadoux, Lemaréchal, Malick, ZAMM 91 (2011).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import warnings
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import SolverError
+from reference import Floats
 from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
 from reference.complementarity.solution import Answer, de_saxce_shift, project_on_cone, velocity_scale
-
-Floats = NDArray[np.float64]
 
 _ITERATIONS = 20_000  # of ADMM
 _TRIED = 250  # iterations before the first Newton attempt; doubled for each further attempt
@@ -28,10 +33,17 @@ _BALANCED_EVERY = 20
 _SOLVED = 1e-12  # largest |F| at unit W and b; Newton's last step leaves some hundred roundings
 _SHORTEST = 2.0**-12  # of Newton's step in the line search
 _DEPENDENT = 1e-11  # share of the largest singular value of F' below which a direction counts as none
+# Of the cone program: accuracy requested at unit W and b (near the apex the natural map reaches its square root), most
+# fixed-point iterations, and the change of the shift, relative to the velocity scale, at which the iteration stops.
+_ACCURACY, _ROUNDS, _STILL = 1e-12, 50, 1e-9
 
 
-def solve(problem: ImpactProblem) -> Answer:
-    """Return the impulse; its residuals show whether it converged."""
+def solve(problem: ImpactProblem, method: str) -> Answer:
+    """Return the impulse by "newton" or "socp"; its residuals show whether it converged."""
+    return _by_cone_programs(problem) if method == "socp" else _by_newton(problem)
+
+
+def _by_newton(problem: ImpactProblem) -> Answer:
     if problem.asymmetry > SYMMETRY_TOLERANCE:
         raise SolverError(f"refused: W is asymmetric (relative {problem.asymmetry:.1e})")
     k, m = problem.contacts, problem.contact_size
@@ -144,3 +156,38 @@ def _projection_derivative(x: Floats, mu: Floats) -> Floats:
     D[:, 1:, 1:] += bend[:, None, None] * (np.eye(m - 1) - along[:, :, None] * along[:, None, :])
     D[inside], D[outside] = np.eye(m), 0.0
     return D
+
+
+def _by_cone_programs(problem: ImpactProblem) -> Answer:
+    import cvxpy as cp
+
+    rows, speed, mu = problem.factor, velocity_scale(problem), problem.friction_or_zero
+    root = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0
+    p, offset = cp.Variable(problem.size), cp.Parameter(problem.size)  # a parameter makes repeated solves cheap
+    blocks = cp.reshape(p, (problem.contact_size, problem.contacts), order="F")
+    rough, smooth = (np.flatnonzero(~problem.two_sided & kind) for kind in (mu > 0.0, mu == 0.0))
+    cones: list[Any] = []
+    if len(rough):
+        cones.append(cp.SOC(cp.multiply(mu[rough], blocks[0, rough]), blocks[1:, rough]))
+    if len(smooth):
+        cones += [blocks[0, smooth] >= 0.0, blocks[1:, smooth] == 0.0]
+    program = cp.Problem(cp.Minimize(0.5 * cp.sum_squares((rows.T / root) @ p) + offset @ p), cones)
+    shift = np.zeros(problem.contacts)
+    for done in range(1, _ROUNDS + 1):
+        scaled = problem.offset / speed
+        scaled[:: problem.contact_size] += shift
+        offset.value = scaled
+        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
+            warnings.simplefilter("ignore", UserWarning)
+            program.solve(solver="CLARABEL", tol_gap_abs=_ACCURACY, tol_gap_rel=_ACCURACY, tol_feas=_ACCURACY)
+        if p.value is None:
+            return Answer(None, f"CLARABEL: {program.status} in round {done}")
+        impulse = np.asarray(p.value) * speed / root**2
+        if problem.relaxed:
+            return Answer(impulse, f"CLARABEL: {program.status}")
+        u = problem.contact_velocity(impulse).reshape(-1, problem.contact_size)
+        slipping = np.where(problem.two_sided, 0.0, mu * np.linalg.norm(u[:, 1:], axis=1))
+        before, shift = shift, slipping / speed
+        if np.abs(shift - before).max(initial=0.0) <= _STILL:
+            return Answer(impulse, f"fixed point after {done} programs")
+    return Answer(impulse, f"fixed point not reached in {_ROUNDS} programs")
