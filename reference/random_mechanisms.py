@@ -34,21 +34,6 @@ def random_inertia(rng: np.random.Generator, mass: float) -> Floats:
     return 0.5 * (inertia + inertia.T)
 
 
-def random_body(rng: np.random.Generator, name: str, parent: str | None, kind: str) -> Body:
-    """Return a random body on a joint of the given kind."""
-    mass = 10.0 ** rng.uniform(*MASS_DECADES)
-    x, y, z = (float(entry) for entry in rng.normal(size=3))
-    return Body(
-        name=name,
-        parent=parent,
-        joint=Joint(kind, (x, y, z)),
-        placement=(random_rotation(rng), rng.normal(scale=0.5, size=3)),
-        mass=mass,
-        center_of_mass=rng.normal(scale=0.3, size=3),
-        inertia=random_inertia(rng, mass),
-    )
-
-
 def random_mechanism(
     rng: np.random.Generator, joints: int, kinds: tuple[str, ...] = tuple(KINDS), trees: int = 1
 ) -> Mechanism:
@@ -60,8 +45,10 @@ def random_mechanism(
         for i in range(joints):
             while len(chain) > 1 and rng.random() < 0.7 * bushy:
                 chain.pop()
-            name = f"body {tree}.{i}"
-            bodies.append(random_body(rng, name, chain[-1] if chain else None, str(rng.choice(kinds))))
+            name, parent, kind = f"body {tree}.{i}", chain[-1] if chain else None, str(rng.choice(kinds))
+            mass, (x, y, z) = 10.0 ** rng.uniform(*MASS_DECADES), rng.normal(size=3).tolist()
+            place, center = (random_rotation(rng), rng.normal(scale=0.5, size=3)), rng.normal(scale=0.3, size=3)
+            bodies.append(Body(name, parent, Joint(kind, (x, y, z)), place, mass, center, random_inertia(rng, mass)))
             chain.append(name)
     return Mechanism(bodies)
 

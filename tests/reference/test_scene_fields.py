@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from iapb.advice.certificate import certify
-from iapb.advice.effects import ignored_fields
 from iapb.errors import ArgumentError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate
@@ -44,12 +41,6 @@ def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str
     assert errors[1] < 0.5 * errors[0] < (0.005 if world == "ideal" else 0.05)  # springs sag, too
 
 
-def test_a_joint_of_the_rigid_world_returns_from_its_limit_as_fast_as_it_came() -> None:
-    run = run_world(arm(gravity=None, **{"contact.restitution": 1.0, "bodies.upper.joint_damping": 0.0}), "ideal")
-    assert run.energy["kinetic"][-1] == pytest.approx(run.energy["kinetic"][0], rel=1e-2)
-    assert (np.abs(np.diff(np.sign(run.v[:, 1]))) > 0).any()
-
-
 @pytest.mark.parametrize("damping", [1.0, 100.0, 900.0])
 def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
     """m = 1 kg, e = 1: v⁺ = −v⁻ of the step's start, and damping divides it by 1 + dt D in the same step."""
@@ -78,28 +69,6 @@ def test_blows_of_damped_joints_gain_nothing_and_a_huge_damping_holds_them() -> 
     assert len(lost) and (lost >= -1e-9).all() and (np.diff(run.energy["kinetic"]) <= 1e-9).all()
     held = run_world(arm(**{"bodies.upper.joint_damping": 1e9, "bodies.lower.joint_damping": 1e9}), "ideal-friction")
     assert np.abs(held.q).max() < 2e-3 and (np.diff(held.energy["friction_work"]) <= 0.0).all()
-
-
-def slope() -> Scene:
-    tilt = math.radians(20.0)
-    box = {"name": "box", "joint": "planar", "mass": 1.0, "inertia": 0.0017, "position": [0, 0.05, 0], "friction": 0.5,
-           "shapes": [{"kind": "box", "size": [0.1, 0.1]}]}
-    ice = box | {"name": "ice", "position": [-1.0, 0.05, 0.0], "friction": 0.0}
-    return Scene.model_validate({
-        "name": "slope", "rate": 1000.0, "duration": 0.2, "bodies": [box, ice],
-        "gravity": [9.81 * math.sin(tilt), -9.81 * math.cos(tilt)],
-        "walls": [{"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}],
-        "contact": {"stiffness": 1e4, "damping": 100.0}})
-
-
-def test_the_rigid_world_with_friction_holds_one_body_and_lets_the_other_slide() -> None:
-    run, free = run_world(slope(), "ideal-friction"), run_world(slope(), "ideal")
-    distance = 0.5 * 9.81 * math.sin(math.radians(20.0)) * 0.2**2
-    assert abs(run.q[-1, 0]) < 1e-6
-    assert run.q[-1, 3] + 1.0 == pytest.approx(distance, rel=0.01)
-    assert "friction" in ignored_fields(free.effects)
-    assert "friction" not in ignored_fields(run.effects)
-    assert free.q[-1, 0] == pytest.approx(distance, rel=0.01)
 
 
 def test_every_world_takes_the_hands_force_over_time() -> None:

@@ -35,13 +35,15 @@ def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name: str) -> Non
 
 
 def test_a_box_on_a_slope_slides_in_the_world_without_friction_and_sticks_in_the_one_with_it() -> None:
-    sin, cos = np.sin(np.pi / 9.0), np.cos(np.pi / 9.0)
+    sin, cos, box = np.sin(np.pi / 9.0), np.cos(np.pi / 9.0), {"kind": "box", "size": [0.1, 0.1]}
     slope = Scene.model_validate({
         "name": "slope", "rate": 500.0, "duration": 0.2, "gravity": [0.0, -9.81], "contact": {"friction": 0.5},
-        "bodies": [{"name": "box", "joint": "planar", "mass": 1.0, "inertia": 1.0 / 600.0,
-                    "position": [0.05 * sin, 0.05 * cos, -np.pi / 9.0], "shapes": [{"kind": "box", "size": [0.1] * 2}]}],
+        "bodies": [{"name": "box", "joint": "planar", "mass": 1.0, "inertia": 1.0 / 600.0, "shapes": [box],
+                    "position": [0.05 * sin, 0.05 * cos, -np.pi / 9.0]}],
         "walls": [{"name": "slope", "kind": "half_plane", "point": [0.0, 0.0], "normal": [sin, cos]}],
     })  # fmt: skip
+    ice = slope.with_values({"bodies.box.friction": 0.0})
+    assert run_world(ice, "ideal-friction").q[-1, :2] == pytest.approx(run_world(ice, "ideal").q[-1, :2], abs=1e-12)
     slid = {name: float(np.diff(run_world(slope, name).q[[0, -1], :2], axis=0)[0] @ [cos, -sin])
             for name in ("ideal", "ideal-friction")}  # fmt: skip
     # The step is a hundredth of 0.2 s, and the law is of first order.
