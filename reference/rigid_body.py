@@ -21,9 +21,8 @@ from iapb.mechanics.mechanism import Mechanism
 from reference import Floats
 
 # Joints whose coordinates are not the integrals of their velocities, by Pinocchio's class.
-_CONTINUOUS, _PLANAR, _SPHERICAL, _FREE_FLYER = range(4)
-_TURNING = {"JointModelRUBZ": _CONTINUOUS, "JointModelPlanar": _PLANAR, "JointModelSpherical": _SPHERICAL,
-            "JointModelFreeFlyer": _FREE_FLYER}  # fmt: skip
+_CONTINUOUS, _SPHERICAL, _FREE_FLYER = range(3)
+_TURNING = {"JointModelRUBZ": _CONTINUOUS, "JointModelSpherical": _SPHERICAL, "JointModelFreeFlyer": _FREE_FLYER}
 # A bias below this share of M |v|² in a few motions is rounding error: it is zero in every motion.
 _NO_BIAS, _MOTIONS = 1e-12, 4
 
@@ -172,11 +171,7 @@ def _rates(layout, q, v):  # type: ignore[no-untyped-def]
     rate = np.empty(len(q))
     for j in range(len(layout) - 1):
         kind, a, b = layout[j]
-        if kind in (_CONTINUOUS, _PLANAR):
-            if kind == _PLANAR:
-                cos, sin = q[a + 2], q[a + 3]
-                rate[a], rate[a + 1] = cos * v[b] - sin * v[b + 1], sin * v[b] + cos * v[b + 1]
-                a, b = a + 2, b + 2
+        if kind == _CONTINUOUS:
             rate[a], rate[a + 1] = -q[a + 1] * v[b], q[a] * v[b]
         elif kind in (_SPHERICAL, _FREE_FLYER):
             if kind == _FREE_FLYER:
