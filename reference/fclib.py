@@ -76,7 +76,12 @@ def read_fclib(path: Path | str) -> StoredProblem:
                 raise ValueError(f"{outside}: expected a file without links to other files")
             kind = "fclib_local" if "fclib_local" in file else "fclib_global"
             group = file[kind]
-            problem = _local(group, path.name) if kind == "fclib_local" else _global(group, path.name)
+            if kind == "fclib_global":
+                problem = _global(group, path.name)
+            else:
+                q, mu = _numbers(group, "vectors/q"), _numbers(group, "vectors/mu")
+                problem = ImpactProblem.from_delassus(_matrix(group["W"], LARGEST_SIZE).toarray(), q, 0.0, mu,
+                                                      contact_size=_spacedim(group), name=path.name)  # fmt: skip
             r = _numbers(file, "solution/r") if "solution/r" in file else np.zeros(0)
             stored = r if r.any() and len(r) == problem.size else None  # zeros are a placeholder, not a solution
             title = bytes(group["info/title"][()]) if "info/title" in group else b""
@@ -109,11 +114,6 @@ def write_fclib(path: Path | str, problem: ImpactProblem, title: str = "", impul
         group["info/title"] = np.bytes_(title or problem.name or "iapb")
         if r is not None:
             file["solution/r"], file["solution/u"] = r, w @ r + q
-
-
-def _local(group: Any, name: str) -> ImpactProblem:
-    w, q, mu = _matrix(group["W"], LARGEST_SIZE), _numbers(group, "vectors/q"), _numbers(group, "vectors/mu")
-    return ImpactProblem.from_delassus(w.toarray(), q, 0.0, mu, contact_size=_spacedim(group), name=name)
 
 
 def _global(group: Any, name: str) -> ImpactProblem:

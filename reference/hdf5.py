@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_KINDS = {1: "a soft link", 64: "a link to another file"}  # by HDF5's number of the kind
-_HARD = 0
+_KINDS = {1: "a soft link", 64: "a link to another file"}  # by HDF5's number of the kind; a hard link has 0
 
 
 def leads_out(file: Any) -> str:
@@ -19,7 +18,7 @@ def leads_out(file: Any) -> str:
     links: list[tuple[bytes, int]] = []
     file.id.links.visit(lambda name, link: links.append((name, int(link.type))), info=True)
     for name, kind in links:
-        if kind != _HARD:
+        if kind:
             return f"/{name.decode()} is {_KINDS.get(kind, f'a link of the kind {kind}')}"
     for name, _ in links:
         item = h5py.h5o.open(file.id, name)

@@ -136,16 +136,34 @@ def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_fre
 
 
 def nearest_velocity(mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats) -> RigidStep:
-    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf ignores a row."""
+    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf ignores a row.
+
+    The impulse is that of the first solver whose recomputed residual is at most STEP_TOLERANCE or rounding.
+    """
     impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
     offset = contact_jacobian[kept] @ v_free - bound[kept]
     if (offset >= 0.0).all():  # no contact acts: the common step of free motion
         return RigidStep(v_free, impulse, 0.0)
-    factor = _cholesky(mass_matrix)
+    factor, said = _cholesky(mass_matrix), list[str]()
     rows = _whitened(factor, contact_jacobian[kept])
     scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
-    impulse[kept], residual = _solve_step(rows, offset, scale)
-    return RigidStep(v_free + _back(factor, rows.T @ impulse[kept]), impulse, residual)
+    for name, solver in STEP_SOLVERS.items():
+        if name == "gauss_seidel" and "infeasible" in said[0]:
+            continue
+        try:
+            p = solver(rows, offset)
+        except SolverError as error:
+            said.append(str(error))
+            continue
+        # the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + offset >= 0, and the terms that cancel in w
+        natural = np.minimum(np.einsum("ij,ij->i", rows, rows) * p, rows @ (rows.T @ p) + offset)
+        residual, sizes = float(np.abs(natural).max(initial=0.0)) / scale, np.abs(rows)
+        cancelling = float((sizes @ (sizes.T @ np.abs(p))).max(initial=0.0))
+        if residual <= max(STEP_TOLERANCE, STEP_ROUNDING * cancelling / scale):
+            impulse[kept] = p
+            return RigidStep(v_free + _back(factor, rows.T @ p), impulse, residual)
+        said.append(f"{name}: residual {residual:.1e}")
+    raise SolverError(f"rigid step with {len(offset)} contacts has no accepted solution: " + "; ".join(said))
 
 
 def solve_mass(mass_matrix: Floats, right: Floats) -> Floats:
@@ -215,27 +233,6 @@ def velocity_bounds(
     when_closed = newton * np.maximum(-gamma_minus, 0.0)
     push_out = stabilization * np.maximum(-gap, 0.0) / dt
     return np.where(gap > 0.0, when_open, np.maximum(when_closed, push_out))
-
-
-def _solve_step(rows: Floats, offset: Floats, scale: float) -> tuple[Floats, float]:
-    """Return p and its recomputed residual from the first solver that reaches STEP_TOLERANCE or rounding level."""
-    said: list[str] = []
-    for name, solver in STEP_SOLVERS.items():
-        if name == "gauss_seidel" and "infeasible" in said[0]:
-            continue
-        try:
-            impulse = solver(rows, offset)
-        except SolverError as error:
-            said.append(str(error))
-            continue
-        # the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + offset >= 0, and the terms that cancel in w
-        natural = np.minimum(np.einsum("ij,ij->i", rows, rows) * impulse, rows @ (rows.T @ impulse) + offset)
-        residual, sizes = float(np.abs(natural).max(initial=0.0)) / scale, np.abs(rows)
-        cancelling = float((sizes @ (sizes.T @ np.abs(impulse))).max(initial=0.0))
-        if residual <= max(STEP_TOLERANCE, STEP_ROUNDING * cancelling / scale):
-            return impulse, residual
-        said.append(f"{name}: residual {residual:.1e}")
-    raise SolverError(f"rigid step with {len(offset)} contacts has no accepted solution: " + "; ".join(said))
 
 
 def friction_step(

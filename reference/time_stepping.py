@@ -143,12 +143,15 @@ class RigidConstraints:
 
     def _solve(self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float,
                found: ContactRows) -> _Solved:  # fmt: skip
-        e, (classes, table) = _restitution(system, found), system.frictions
+        (classes, table), values, shapes = system.frictions, system.restitutions, found.geometry[:2]
+        e: float | Floats = float(values[0]) if len(values) else float(system.scene.contact.restitution)
+        if len(values) > 1:  # pairs that can touch differ: one e for each contact
+            e = restitution_by_pair(system.scene, np.stack(shapes, axis=1))
         if self.friction == "none" or not table.any():
             step = rigid_step(mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization,
                               self.scheme)  # fmt: skip
             return _Solved(step.velocity, step.impulse, np.zeros((len(found.gap), 3)), np.zeros_like(found.jacobian.T))
-        mu = table[classes[found.geometry.shape_a], classes[found.geometry.shape_b]]
+        mu = table[classes[shapes[0]], classes[shapes[1]]]
         bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
         tangents, rows = tangent_rows(system, q, found)
         v_free, relaxed = v + dt * np.linalg.solve(mass, force), self.friction == "relaxed"
@@ -181,15 +184,6 @@ def cost_of(system: Any) -> Cost:
     contacts = int(points[pairs].min(axis=1).sum()) + len(system.stops.bound)
     d = system.mechanism.nv
     return Cost(contacts, d, SECONDS_A_STEP + SECONDS_AN_ENTRY * contacts * d)
-
-
-def _restitution(system: Any, found: ContactRows) -> float | Floats:
-    """Return one e for all contacts, or e of each contact (c,) if the pairs that can touch differ."""
-    values = system.restitutions
-    if len(values) <= 1:
-        return float(values[0]) if len(values) else float(system.scene.contact.restitution)
-    pairs = np.stack([found.geometry.shape_a, found.geometry.shape_b], axis=1)
-    return restitution_by_pair(system.scene, pairs)
 
 
 def _blows(mass: Floats, found: ContactRows, impulse: Floats, approach_velocity: float) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
 from iapb.errors import SolverError
@@ -58,9 +59,7 @@ def scene_of(*bodies: dict[str, Any], gravity: float = 0.0, **given: Any) -> Spa
 
 def axes_of(quaternions: Floats) -> Floats:
     """Return rotation matrices (n, 3, 3) of quaternions (n, 4), (x, y, z, w)."""
-    u, w = quaternions[:, :3], quaternions[:, 3]
-    cross = np.array([np.cross(each, np.eye(3)).T for each in u])
-    return np.asarray(np.eye(3) + 2.0 * (w[:, None, None] * cross + cross @ cross))
+    return np.asarray(Rotation.from_quat(quaternions).as_matrix())
 
 
 # --- torque-free motion ------------------------------------------------------------------------------------------

@@ -124,8 +124,7 @@ def test_the_parts_of_a_step_add_up_to_the_change_of_momentum_and_the_peg_comes_
         result = law.advance(system, state, force, dt)
         change = dt * (force + result.penalty_force + result.friction_force) + result.impulse
         assert np.abs(mass @ (result.v - before) - change).max() <= 1e-12
-        if state.impacts.logged[0]:
-            assert state.impacts.energy_lost[0] >= 0.0 and result.state == COLLIDING
+        assert (result.state == COLLIDING) == bool(state.impacts.logged[0])
         state.q[:], state.v[:] = result.q, result.v
         states.add(result.state)
         deepest = min(deepest, state.contacts.gap[: state.contact_count[0]].min(initial=0.0))

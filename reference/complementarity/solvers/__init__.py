@@ -61,7 +61,6 @@ SOLVERS: dict[str, SolverEntry] = {
     "siconos_nsgs": SolverEntry(_SICONOS, "siconos", "nonsmooth Gauss-Seidel", "cone", option="NSGS"),
     "siconos_newton": SolverEntry(_SICONOS, "siconos", "Alart-Curnier Newton", "cone", option="NSN_AC"),
 }  # fmt: skip
-_INSTALL_NAMES = {"pinocchio": "pin"}  # packages whose install name differs from their import name
 
 
 def solver_names(problem: ImpactProblem | None = None) -> tuple[str, ...]:
@@ -121,7 +120,7 @@ def _load(solver: str, entry: SolverEntry) -> Callable[..., Answer]:
                 import_alone(package)
         module = importlib.import_module(entry.module)
     except ImportError as error:
-        install = "pip install " + " ".join(_INSTALL_NAMES.get(x, x) for x in entry.package.split())
+        install = "pip install " + entry.package.replace("pinocchio", "pin")
         raise MissingDependencyError(entry.package, f"solver {solver!r}", install) from error
     if hasattr(module, "start"):
         module.start()

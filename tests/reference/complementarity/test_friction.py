@@ -63,13 +63,6 @@ def test_solvers_agree_on_random_problems(relaxed: bool) -> None:
                 assert np.abs(solution.velocity_plus - solutions[0].velocity_plus).max() <= 1e-5
 
 
-def test_relaxed_and_coulomb_answers_are_not_taken_for_each_other() -> None:
-    coulomb = mass_on_a_plane([-1.0, 3.0, 4.0], 0.5)
-    relaxed = mass_on_a_plane([-1.0, 3.0, 4.0], 0.5, relaxed=True)
-    assert not Solution(coulomb, solve(relaxed, "nsgs").impulse).solved(1e-3)
-    assert not Solution(relaxed, solve(coulomb, "nsgs").impulse).solved(1e-3)
-
-
 def test_kinds_of_problems_are_refused_by_solvers_of_the_other_kind() -> None:
     here = solver_names(mass_on_a_plane([1.0, 0.0, 0.0], 0.5))
     assert tuple(name for name in here if SOLVERS[name].package != "siconos") == CONE_SOLVERS
