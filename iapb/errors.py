@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import pickle
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +26,7 @@ class IapbError(Exception):
     def __reduce__(self) -> tuple[Any, ...]:
         """Rebuild from message and attributes, because `args` lacks the arguments of a subclass's __init__."""
         attributes = {name: _portable(value) for name, value in vars(self).items()}
-        return _restored, (type(self), self.args, attributes)
+        return copyreg.__newobj__, (type(self), *self.args), attributes  # type: ignore[attr-defined]
 
 
 def _portable(value: Any) -> Any:
@@ -34,12 +35,6 @@ def _portable(value: Any) -> Any:
     except Exception:  # a value's own __reduce__ may raise any exception
         return shown(value)
     return value
-
-
-def _restored(kind: type[IapbError], args: tuple[Any, ...], attributes: dict[str, Any]) -> IapbError:
-    error = kind.__new__(kind, *args)
-    error.__dict__.update(attributes)
-    return error
 
 
 class ArgumentError(IapbError, ValueError):
