@@ -55,14 +55,11 @@ def symmetric_entry(matrix, i, j):
 
 
 @kernel
-def quadratic_forms(mass_matrix, v, change):
-    """Return vᵀ M Δv and Δvᵀ M Δv of the symmetric part of M, each evaluated in double-double and rounded once."""
-    return _scaled_forms(mass_matrix, v, change, 1.0, 1.0)
+def quadratic_forms(mass_matrix, v, change, v_unit=1.0, change_unit=1.0):
+    """Return vᵀ M Δv and Δvᵀ M Δv of the symmetric part of M, each evaluated in double-double and rounded once.
 
-
-@kernel
-def _scaled_forms(mass_matrix, v, change, v_unit, change_unit):
-    """Return the quadratic forms of v · v_unit and Δv · change_unit; the units are powers of two."""
+    v and Δv are first scaled by their units, which are powers of two.
+    """
     d = v.shape[0]
     cross_hi = cross_lo = square_hi = square_lo = 0.0
     for i in range(d):
@@ -101,7 +98,7 @@ def passive_range(mass_matrix, v, change):
     scale = 1.0
     if not in_range(cross, square):
         v_unit, change_unit = unit_of(v), unit_of(change)
-        cross, square = _scaled_forms(mass_matrix, v, change, v_unit, change_unit)
+        cross, square = quadratic_forms(mass_matrix, v, change, v_unit, change_unit)
         scale = change_unit / v_unit
     if not square > 0.0 or cross >= 0.0:
         return 0.0, 0.0

@@ -95,12 +95,6 @@ def sine(angle):
 
 
 @kernel
-def cosine(angle):
-    """Return cos of an angle [rad]."""
-    return sine_cosine(angle)[1]
-
-
-@kernel
 def _power_of_two(largest):
     """Return a power of two that scales a number so that its square neither over- nor underflows."""
     return 2.0**600 if largest < 2.0**-400 else (2.0**-600 if largest > 2.0**400 else 1.0)

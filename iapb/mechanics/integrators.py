@@ -8,8 +8,7 @@ free rigid body with order 4. With contact, or under forces of a hand or device,
 All others are explicit and start a step from (q, v) alone (an impulse may have changed v just before). Stage i lies at
 the fraction `fraction[i]` of the step; it is reached from the start of the step with velocity and acceleration of the
 stage before it, and has the weight `weight[i]`. The compiled step reads these numbers; `Integrator.step` does the same
-in Python for any acceleration. COMMUTATOR_FREE_4 exists in Python only; it keeps its fourth order where rotations do
-not commute. On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
+in Python for any acceleration. On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """
 
 from __future__ import annotations
@@ -55,31 +54,6 @@ class Integrator(NamedTuple):
         return integrate(q, v_next if self.semi_implicit else mean_rate, dt), v_next
 
 
-class _CommutatorFree4(Integrator):
-    """Commutator-free method of fourth order (Celledoni, Marthinsen and Owren, 2003).
-
-    On vector coordinates it is the classical Runge-Kutta method.
-    """
-
-    __slots__ = ()
-
-    def step(
-        self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
-    ) -> tuple[Floats, Floats]:
-        """Return (q, v) after one step of dt [s], at fourth order on every configuration space."""
-        v1, a1 = v, acceleration(q, v)
-        q2, v2 = integrate(q, v1, 0.5 * dt), v + 0.5 * dt * a1
-        a2 = acceleration(q2, v2)
-        q3, v3 = integrate(q, v2, 0.5 * dt), v + 0.5 * dt * a2
-        a3 = acceleration(q3, v3)
-        q4, v4 = integrate(q2, v3 - 0.5 * v1, dt), v + dt * a3
-        a4 = acceleration(q4, v4)
-        q_half = integrate(q, (3.0 * v1 + 2.0 * v2 + 2.0 * v3 - v4) / 12.0, dt)
-        q_next = integrate(q_half, (3.0 * v4 + 2.0 * v3 + 2.0 * v2 - v1) / 12.0, dt)
-        return q_next, v + dt * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
-
-
-_STAGES_4 = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 # The integrators that a contact law may name.
 INTEGRATORS: dict[str, Integrator] = {
     method.name: method
@@ -87,7 +61,6 @@ INTEGRATORS: dict[str, Integrator] = {
         Integrator("momentum", 1, 4, (0.0,), (1.0,), semi_implicit=True, conserving=True),
         Integrator("semi_implicit_euler", 1, 1, (0.0,), (1.0,), semi_implicit=True),
         Integrator("midpoint", 2, 2, (0.0, 0.5), (0.0, 1.0)),
-        Integrator("runge_kutta_4", 4, 2, *_STAGES_4),
+        Integrator("runge_kutta_4", 4, 2, (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
     )
 }
-COMMUTATOR_FREE_4 = _CommutatorFree4("commutator_free_4", 4, 4, *_STAGES_4)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.mechanics.integrators import COMMUTATOR_FREE_4, INTEGRATORS, Integrator
+from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
 from verification.finding import (
@@ -28,6 +28,7 @@ from verification.finding import (
     table_of,
     verdict_of_law,
 )
+from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
 
 Floats = NDArray[np.float64]
 

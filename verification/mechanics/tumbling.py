@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.laws import Penalty
-from iapb.mechanics.integrators import COMMUTATOR_FREE_4, INTEGRATORS, Integrator
+from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
 from verification.finding import Column, Failure, Part, Table, check_depth, of_each, table_of, verdict_of_law
+from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
 from verification.mechanics.power_balance import by, span, words
 from verification.mechanics.torque_free import TorqueFreeBody
 

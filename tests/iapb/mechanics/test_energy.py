@@ -93,15 +93,6 @@ def test_shapes_that_do_not_belong_together_are_named():
         energy_ledger(mechanism, FIELD, q[:, :1], v, forces, impulse)
 
 
-@pytest.mark.parametrize("steps", [0, 1, 2, 5])
-def test_n_places_have_n_minus_one_displacements_between_them(steps):
-    mechanism, rng = arm(), np.random.default_rng(0)
-    q = rng.normal(size=(steps, 2))
-    found = mechanism.displacements(q)
-    assert found.shape == (max(steps - 1, 0), 2)
-    assert found == pytest.approx(np.diff(q, axis=0).reshape(-1, 2), abs=1e-15)
-
-
 def test_a_run_summed_in_parts_has_the_bits_of_the_whole():
     mechanism, steps = arm(), 24
     q, v, forces, impulses = driven(mechanism, INTEGRATORS["midpoint"], steps, 0.5)

@@ -17,9 +17,9 @@ from iapb.scene.mechanism import mechanism_of
 from reference.random_mechanisms import random_mechanism, random_state
 
 FIELD = np.array([0.3, -9.0, 2.0])  # a gravity field along no axis
-SCALED_CONDITION = 1e12  # beyond it a correct M may round to an indefinite one
 STEP = 1e-5  # of central differences: error STEP^2, rounding eps / STEP
 moving_kinds = tuple(kind for kind in KINDS if kind != "fixed")
+OFTEN_FIXED = (*KINDS, "fixed", "fixed", "fixed")
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -30,6 +30,9 @@ def rod(name, parent, x, joint=None):
 
 def two_link_arm():
     return Mechanism([rod("upper", None, 0.0), rod("lower", "upper", 1.0)])
+
+
+WHEEL = Mechanism([rod("a", None, 0, Joint("continuous"))])
 
 
 def test_the_arm_of_figure_2_has_its_textbook_mass_matrix_and_energy():
@@ -44,46 +47,36 @@ def test_the_arm_of_figure_2_has_its_textbook_mass_matrix_and_energy():
     assert arm.kinetic_energy([np.pi / 2, 0.0], [1.0, 1.0]) == pytest.approx(7.0 / 3.0, rel=1e-15)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_mass_matrix_and_momenta_are_sums_over_the_bodies(seed):
+@settings(max_examples=40)
+@given(seeds, st.integers(1, 10), st.integers(1, 3))
+def test_mass_matrix_momenta_and_energy_are_sums_over_the_bodies(seed, joints, trees):
     """M = Σ m JᵀJ + JωᵀI Jω at the centres of mass; Σ m u and Σ I ω + (c − c̄) × m u, written out with numpy."""
     rng = np.random.default_rng(seed)
-    mechanism = random_mechanism(rng, 7, moving_kinds, trees=2)
+    mechanism = random_mechanism(rng, joints, OFTEN_FIXED, trees)
     q, v = random_state(rng, mechanism)
     rotations, positions = mechanism.placements(q)
-    mass, centers, momenta, spins = np.zeros((mechanism.nv, mechanism.nv)), [], [], []
+    mass, centers, momenta, spins, masses = np.zeros((mechanism.nv, mechanism.nv)), [], [], [], []
     for b, body in enumerate(mechanism.bodies):
-        centers.append(positions[b] + rotations[b] @ body.center_of_mass)
-        moving, turning = mechanism.point_jacobian(q, b, centers[b]), mechanism.frame_jacobian(q, b)[3:]
+        center = positions[b] + rotations[b] @ body.center_of_mass
+        moving, turning = mechanism.point_jacobian(q, b, center), mechanism.frame_jacobian(q, b)[3:]
         inertia = rotations[b] @ body.inertia @ rotations[b].T
         mass += body.mass * moving.T @ moving + turning.T @ inertia @ turning
-        momenta.append(body.mass * moving @ v)
-        spins.append(inertia @ turning @ v)
-    np.testing.assert_allclose(mechanism.mass_matrix(q), mass, rtol=1e-11, atol=1e-11 * np.abs(mass).max())
-    common = np.average(centers, axis=0, weights=[body.mass for body in mechanism.bodies])
-    angular = np.sum(spins, axis=0) + np.sum(np.cross(centers - common, momenta), axis=0)
-    expected = [*np.sum(momenta, axis=0), *angular]
-    np.testing.assert_allclose(mechanism.centroidal_momentum(q, v), expected, rtol=1e-10, atol=1e-10)
-
-
-@settings(max_examples=40)
-@given(seeds, st.integers(1, 12), st.integers(1, 3))
-def test_the_mass_matrix_is_symmetric_block_diagonal_and_positive(seed, joints, trees):
-    rng = np.random.default_rng(seed)
-    mechanism = random_mechanism(rng, joints, moving_kinds, trees)
-    q, v = random_state(rng, mechanism)
-    mass = mechanism.mass_matrix(q)
-    assert (mass == mass.T).all()
+        if moving.any() or turning.any():
+            masses.append(body.mass)
+            centers.append(center)
+            momenta.append(body.mass * moving @ v)
+            spins.append(inertia @ turning @ v)
+    found, size = mechanism.mass_matrix(q), np.abs(mass).max(initial=0.0)
+    np.testing.assert_allclose(found, mass, rtol=0.0, atol=1e-11 * size)
     outside = np.ones_like(mass, dtype=bool)
     for start, stop in mechanism.tree_dofs:
         outside[start:stop, start:stop] = False
-    assert (mass[outside] == 0.0).all()
-    scale = 1.0 / np.sqrt(np.diag(mass))
-    scaled = mass * np.outer(scale, scale)
-    if np.linalg.cond(scaled) <= SCALED_CONDITION:
-        assert np.linalg.eigvalsh(scaled)[0] > 0.0
-    by_bodies = mechanism.kinetic_energy(q, v)
-    assert 0.5 * v @ mass @ v == pytest.approx(by_bodies, rel=1e-10)
+    assert (found == found.T).all() and not found[outside].any()
+    assert mechanism.kinetic_energy(q, v) == pytest.approx(0.5 * v @ mass @ v, rel=1e-9)
+    if masses:
+        spins = np.sum(spins, axis=0) + np.sum(np.cross(centers - np.average(centers, 0, masses), momenta), axis=0)
+        expected = [*np.sum(momenta, axis=0), *spins]
+        np.testing.assert_allclose(mechanism.centroidal_momentum(q, v), expected, rtol=1e-9, atol=1e-9)
 
 
 def energy_rate(mechanism, q, v, dv):
@@ -110,9 +103,8 @@ def test_power_balance(seed, joints):
     q, v = random_state(rng, mechanism, speed=0.3)
     dv = rng.normal(size=mechanism.nv)
     tau = mechanism.mass_matrix(q) @ dv + mechanism.bias(q, v) + mechanism.gravity(q, FIELD)
-    np.testing.assert_allclose(
-        tau, mechanism.inverse_dynamics(q, v, dv, FIELD), atol=1e-12 * np.abs(tau).max(), rtol=0
-    )
+    found = mechanism.inverse_dynamics(q, v, dv, FIELD)
+    np.testing.assert_allclose(found, tau, rtol=0, atol=1e-12 * np.abs(tau).max())
     assert power_gap(mechanism, q, v, dv, tau) <= 1e-5
 
 
@@ -138,12 +130,11 @@ def test_jacobians_are_the_derivatives_of_positions(seed, joints):
 
     (after, turned), (before, unturned) = place(STEP), place(-STEP)
     point = positions[body] + rotations[body] @ local
-    np.testing.assert_allclose(
-        mechanism.point_jacobian(q, body, point) @ v, (after - before) / (2 * STEP), atol=1e-6, rtol=1e-6
-    )
+    jacobian = mechanism.point_jacobian(q, body, point)
+    np.testing.assert_allclose(jacobian @ v, (after - before) / (2 * STEP), atol=1e-6, rtol=1e-6)
     along = rng.normal(size=3)
     rows = mechanism.rows_along([q, q], [-1, body], [point, point], [along, along])
-    expected = [0.0 * v, along @ mechanism.point_jacobian(q, body, point)]
+    expected = [0.0 * v, along @ jacobian]
     np.testing.assert_allclose(rows, expected, atol=1e-13, rtol=1e-12)
     at_origin = mechanism.point_jacobian(q, body, positions[body])
     np.testing.assert_array_equal(mechanism.frame_jacobian(q, body)[:3], at_origin)
@@ -152,36 +143,12 @@ def test_jacobians_are_the_derivatives_of_positions(seed, joints):
     np.testing.assert_allclose(turning, [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-6, rtol=1e-6)
 
 
-@settings(max_examples=25)
-@given(seeds)
-def test_the_order_of_siblings_does_not_matter(seed):
-    rng = np.random.default_rng(seed)
-    chain = random_mechanism(rng, 3, moving_kinds).bodies
-    twig = random_mechanism(rng, 1, moving_kinds).bodies[0]
-    side = Body(
-        "side", chain[0].name, twig.joint, twig.placement, twig.mass, twig.center_of_mass, twig.inertia
-    )
-    last, early = Mechanism([*chain, side]), Mechanism([chain[0], side, *chain[1:]])
-    n, k = side.joint.layout.nv, chain[0].joint.layout.nv
-    d = last.nv
-    order = [*range(k), *range(d - n, d), *range(k, d - n)]  # velocities of `early` as entries of `last`
-    q, v = random_state(rng, last)
-    m, j = side.joint.layout.nq, chain[0].joint.layout.nq
-    q_early = np.concatenate([q[:j], q[last.nq - m :], q[j : last.nq - m]])
-    expected = last.mass_matrix(q)[np.ix_(order, order)]
-    # The order of summation changes: rounding is relative to the largest entry, since smaller ones are what cancels.
-    np.testing.assert_allclose(early.mass_matrix(q_early), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-    expected = last.bias(q, v)[order]
-    np.testing.assert_allclose(early.bias(q_early, v[order]), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-
-
 def test_a_copy_through_pickle_gives_the_same_numbers():
     mechanism = random_mechanism(np.random.default_rng(1), 5, moving_kinds)
     copy = pickle.loads(pickle.dumps(mechanism))
     q, v = random_state(np.random.default_rng(2), mechanism)
-    assert (copy.mass_matrix(q) == mechanism.mass_matrix(q)).all() and (
-        copy.bias(q, v) == mechanism.bias(q, v)
-    ).all()
+    np.testing.assert_array_equal(copy.mass_matrix(q), mechanism.mass_matrix(q))
+    np.testing.assert_array_equal(copy.bias(q, v), mechanism.bias(q, v))
 
 
 def test_results_belong_to_the_caller():
@@ -207,83 +174,45 @@ def test_names_units_and_layout():
     np.testing.assert_array_equal(mechanism.neutral(), [0, 0, 0, 0, 0, 0, 1, 1, 0])
 
 
-@pytest.mark.parametrize(
-    ("call", "named"),
-    [
-        (lambda: Joint("hinge"), "kind"),
-        (lambda: Joint("revolute", (0, 0, 0)), "axis"),
-        (lambda: Body("b", None, Joint("fixed"), mass=-1.0), "mass"),
-        (lambda: Body("b", None, Joint("fixed"), mass=float("nan")), "mass"),
-        (lambda: Body("b", None, Joint("fixed"), (np.diag([1, 1, -1]), np.zeros(3))), "placement rotation"),
-        (lambda: Body("b", None, Joint("fixed"), inertia=np.triu(np.ones((3, 3)))), "inertia"),
-        (lambda: Mechanism([rod("a", "b", 0.0)]), "parent"),
-        (lambda: Mechanism([rod("a", None, 0.0), rod("a", None, 0.0)]), "name"),
-        (lambda: Mechanism([rod("a", None, 0), rod("b", None, 0), rod("c", "a", 0)]), "bodies"),
-        (lambda: two_link_arm().mass_matrix([0.0]), "q"),
-        (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
-        (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
-        (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),
-        (lambda: two_link_arm().rows_along([[0.0, 0.0]], [0, 1], [[0, 0, 0]], [[1, 0, 0]]), "as many as qs"),
-        (
-            lambda: Mechanism([rod("a", None, 0, Joint("continuous"))]).mass_matrix([1.0, 1.0]),
-            "q of body 'a'",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("call", "named"), [
+    (lambda: Joint("hinge"), "kind"),
+    (lambda: Joint("revolute", (0, 0, 0)), "axis"),
+    (lambda: Body("b", None, Joint("fixed"), mass=-1.0), "mass"),
+    (lambda: Body("b", None, Joint("fixed"), mass=float("nan")), "mass"),
+    (lambda: Body("b", None, Joint("fixed"), (np.diag([1, 1, -1]), np.zeros(3))), "placement rotation"),
+    (lambda: Body("b", None, Joint("fixed"), inertia=np.triu(np.ones((3, 3)))), "inertia"),
+    (lambda: Mechanism([rod("a", "b", 0.0)]), "parent"),
+    (lambda: Mechanism([rod("a", None, 0.0), rod("a", None, 0.0)]), "name"),
+    (lambda: Mechanism([rod("a", None, 0), rod("b", None, 0), rod("c", "a", 0)]), "bodies"),
+    (lambda: two_link_arm().mass_matrix([0.0]), "q"),
+    (lambda: two_link_arm().mass_matrix([["a", "b"]]), "q"),
+    (lambda: two_link_arm().mass_matrices([[0.0]]), "qs"),
+    (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
+    (lambda: two_link_arm().biases([[0.0, 0.0]], [[0.0, 0.0], [0.0, np.inf]]), "as many rows as qs"),
+    (lambda: two_link_arm().biases([[0.0, 0.0]] * 2, [[0.0, 0.0], [0.0, np.inf]]), r"vs\[1\]"),
+    (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
+    (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),
+    (lambda: two_link_arm().rows_along([[0.0, 0.0]], [0, 1], [[0, 0, 0]], [[1, 0, 0]]), "as many as qs"),
+    (lambda: WHEEL.mass_matrix([1.0, 1.0]), "q of body 'a'"),
+    (lambda: WHEEL.mass_matrices([[1.0, 0.0], [1.0, 1.0]]), r"qs\[1\] of body 'a'"),
+])  # fmt: skip
 def test_errors_name_the_argument(call, named):
     with pytest.raises(ArgumentError, match=named):
         call()
 
 
-def some_states(seed: int, count: int) -> tuple[Mechanism, np.ndarray, np.ndarray]:
+@given(seeds, st.integers(0, 5))
+def test_many_states_give_bit_for_bit_what_each_gives_alone_in_any_layout(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     mechanism = random_mechanism(rng, 5)
     states = [random_state(rng, mechanism) for _ in range(count)]
-    qs, vs = (np.array(rows).reshape(count, -1) for rows in zip(*states, strict=True))
-    return mechanism, qs, vs
-
-
-@given(seeds, st.integers(1, 5))
-def test_many_states_give_bit_for_bit_what_each_gives_alone(seed: int, count: int) -> None:
-    mechanism, qs, vs = some_states(seed, count)
-    np.testing.assert_array_equal(mechanism.mass_matrices(qs), [mechanism.mass_matrix(q) for q in qs])
-    alone = [mechanism.bias(q, v) for q, v in zip(qs, vs, strict=True)]
-    np.testing.assert_array_equal(mechanism.biases(qs, vs), alone)
-
-
-def test_any_layout_and_type_of_numbers_is_read_right() -> None:
-    mechanism, qs, vs = some_states(3, 4)
-    for layout in (np.asfortranarray, lambda rows: np.repeat(rows, 2, axis=1)[:, ::2], list):
-        np.testing.assert_array_equal(mechanism.mass_matrices(layout(qs)), mechanism.mass_matrices(qs))
-        np.testing.assert_array_equal(mechanism.biases(layout(qs), layout(vs)), mechanism.biases(qs, vs))
-    columns = np.asfortranarray(qs)
-    np.testing.assert_array_equal(mechanism.mass_matrix(columns[1]), mechanism.mass_matrix(qs[1]))
-    whole = np.zeros(mechanism.nv, dtype=np.int64)
-    np.testing.assert_array_equal(mechanism.bias(qs[0], whole), mechanism.bias(qs[0], 0.0 * vs[0]))
-
-
-def test_no_states_give_no_matrices() -> None:
-    mechanism, qs, vs = some_states(4, 1)
-    d = mechanism.nv
-    assert mechanism.mass_matrices(qs[:0]).shape == (0, d, d)
-    assert mechanism.biases(qs[:0], vs[:0]).shape == (0, d)
-
-
-def test_the_row_at_fault_is_named() -> None:
-    mechanism = random_mechanism(np.random.default_rng(1), 3, ("spherical",))
-    qs, vs = np.tile(mechanism.neutral(), (4, 1)), np.zeros((4, mechanism.nv))
-    qs[2, 3] = 1.1
-    with pytest.raises(ArgumentError, match=r"qs\[2\] of body 'body 0.0'"):
-        mechanism.mass_matrices(qs)
-    qs[2, 3], vs[1, 0] = 1.0, np.nan
-    with pytest.raises(ArgumentError, match=r"vs\[1\]"):
-        mechanism.biases(qs, vs)
-    with pytest.raises(ArgumentError, match="as many rows as qs"):
-        mechanism.biases(qs, vs[:2])
-    with pytest.raises(ArgumentError, match="qs"):
-        mechanism.mass_matrices(qs[:, 1:])
-    with pytest.raises(ArgumentError, match="qs"):
-        mechanism.mass_matrices([["a"] * mechanism.nq])
+    qs, vs = (np.array([state[i] for state in states]).reshape(count, -1 if count else n)
+              for i, n in enumerate((mechanism.nq, mechanism.nv)))
+    masses = np.array([mechanism.mass_matrix(q) for q in qs]).reshape(count, mechanism.nv, mechanism.nv)
+    biases = np.array([mechanism.bias(q, v) for q, v in zip(qs, vs, strict=True)]).reshape(vs.shape)
+    for layout in (np.asarray, np.asfortranarray, lambda rows: np.repeat(rows, 2, axis=1)[:, ::2]):
+        np.testing.assert_array_equal(mechanism.mass_matrices(layout(qs)), masses)
+        np.testing.assert_array_equal(mechanism.biases(layout(qs), layout(vs)), biases)
 
 
 @pytest.mark.parametrize("name", ["arm_obstacles", "peg_hole_space", "arm_pushing"])

@@ -7,10 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.compiled import block
 from iapb.mechanics.joints import KINDS
-from iapb.mechanics.kernels import dynamics
-from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.mechanics.structure import moving_parts
 from reference.random_mechanisms import random_mechanism, random_state
@@ -73,34 +70,6 @@ def test_a_no_is_always_true(seed, joints):
         assert change <= 1e-10 * size
     if not mechanism.has_velocity_terms:
         assert force <= 1e-10 * size
-
-
-AGREEMENT = 1e-12  # of the largest entry: the same sums in another order, over ten bodies
-KINDS_OFTEN_FIXED = (*KINDS, "fixed", "fixed", "fixed")
-
-
-def unmerged(mechanism: Mechanism, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """M and B from all bodies, moving or not."""
-    mass, bias = np.zeros((mechanism.nv, mechanism.nv)), np.zeros(mechanism.nv)
-    arrays, scratch = block(mechanism.arrays), block(mechanism.workspace())
-    forward_kinematics(arrays, q, scratch)
-    dynamics.mass_matrix(arrays, scratch, mass)
-    dynamics.bias(arrays, scratch, v, bias)
-    return mass, bias
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 10), st.integers(1, 3))
-def test_mass_matrix_and_bias_are_those_of_all_bodies(seed: int, joints: int, trees: int) -> None:
-    rng = np.random.default_rng(seed)
-    mechanism = random_mechanism(rng, joints, KINDS_OFTEN_FIXED, trees)
-    q, v = random_state(rng, mechanism)
-    mass, bias = unmerged(mechanism, q, v)
-    speed = np.abs(v).max(initial=0.0) ** 2
-    scale = np.abs(mass).max(initial=0.0)
-    assert np.abs(mechanism.mass_matrix(q) - mass).max(initial=0.0) <= AGREEMENT * scale
-    assert np.abs(mechanism.bias(q, v) - bias).max(initial=0.0) <= AGREEMENT * max(
-        np.abs(bias).max(initial=0.0), scale * speed
-    )
 
 
 def test_only_bodies_that_move_are_left() -> None:

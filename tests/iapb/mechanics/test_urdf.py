@@ -225,11 +225,3 @@ def test_a_hand_of_boxes_and_spheres_falls_on_the_floor(tmp_path: Path) -> None:
     assert sum(len(body.shapes) for body in scene.bodies) == 21
     run = simulate(scene, steps=250)
     assert run.complete and np.diff(run.contacts.offsets).max() > 0
-
-
-@pytest.mark.skipif(not (ROBOTS / "panda.urdf").exists(), reason="shared robot files are not here")
-def test_an_arm_of_meshes_is_refused_by_the_names_of_its_links(tmp_path: Path) -> None:
-    file = write(tmp_path, BALL)
-    shutil.copy(ROBOTS / "panda.urdf", tmp_path / "r.urdf")
-    with pytest.raises(SceneError, match="panda_link0 <mesh>"):
-        load_scene(file)

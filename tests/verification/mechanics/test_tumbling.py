@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError
-from iapb.mechanics.integrators import COMMUTATOR_FREE_4, INTEGRATORS
+from iapb.mechanics.integrators import INTEGRATORS
 from verification.mechanics import tumbling
+from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
 from verification.mechanics.torque_free import TorqueFreeBody
 
 H = 1e-4  # [s] of central differences: their error is about H^2
