@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from iapb.double_double import add_product, kinetic_energies, quadratic_forms, two_product, two_sum
 from iapb.elementary import arc_tangent, hypotenuse, sine, sine_cosine
-from iapb.linalg import product, solve
+from iapb.linalg import product
 
 NUMBERS = np.random.default_rng(8)
 ANGLES = np.concatenate([
@@ -126,15 +126,3 @@ def test_products_of_integers_are_exact() -> None:
     np.testing.assert_array_equal(product(b.T, a[0]), b.T @ a[0])
     assert product(np.zeros((0, 3)), b).shape == (0, 5)
     assert (product(np.zeros((2, 0)), np.zeros(0)) == 0.0).all()
-
-
-def test_solve_exchanges_rows() -> None:
-    matrix = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [4.0, 1.0, 0.0]])
-    x = solve(matrix, [5.0, 1.0, 7.0])
-    exact = [sum(Fraction(m) * Fraction(value) for m, value in zip(row, x, strict=True)) for row in matrix]
-    assert exact == [5, 1, 7]
-
-
-def test_a_singular_matrix_is_refused() -> None:
-    with pytest.raises(ZeroDivisionError, match="singular"):
-        solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 1.0])
