@@ -66,11 +66,11 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         placed.append((rotation, position))
         own.append((np.eye(3), np.zeros(3)) if moves[b] else placed[b])
         carrier.append(b if moves[b] else carrier[parent] if parent >= 0 else -1)
-    moving = np.flatnonzero(moves)
+    moving, carriers = np.flatnonzero(moves), np.array(carrier)
     new_index = {b: i for i, b in enumerate(moving.tolist())} | {-1: -1}
     masses, centers, inertias = [], [], []
     for body in moving:
-        members = np.flatnonzero(np.array(carrier) == body)
+        members = np.flatnonzero(carriers == body)
         mass, center = sum(m.mass[members].tolist()), m.center_of_mass[body]
         places = np.array([own[b][1] + product(own[b][0], m.center_of_mass[b]) for b in members])
         if len(members) > 1 and mass > 0.0:
