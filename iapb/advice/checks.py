@@ -522,7 +522,7 @@ AUTO_K, AUTO_B = 0.2, 0.5  # k and b at the most critical contacts: k + 2 b = 1.
 SPARE = 2.0  # factor by which later contacts may be lighter than those at the start
 SAG_ALLOWED, SAG_SHARE = 1e-4, 1e-3  # m, and share of the smallest shape: largest static sag of implicit contact
 SPARE_LOAD = 10.0  # times the weight of everything that moves: levers and wedges can press harder
-RELAXATION = 0.01  # s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
+RELAXATION = 0.1  # s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
 STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
 _UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
 
@@ -545,11 +545,11 @@ def settled(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
 def _firm(scene: Scene) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return stiffness and damping of implicit contact that are not given, and a sentence on them.
 
-    The stiffness holds ten times the weight of all bodies, and the hand's force, at the sag allowed.
+    The stiffness holds ten times the weight of all bodies and the hand's largest force, at the sag allowed.
     """
     sag = min([SAG_ALLOWED, *(SAG_SHARE * solid.thin for solid in solids_of(shapes_of(scene)).values())])
     load = sum(body.mass for body in scene.bodies) * max(STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,))))
-    load += scene.hand.largest_force() if scene.hand is not None and not scene.hand.force_function else 0.0
+    load += scene.hand.largest_force(scene.duration) if scene.hand is not None else 0.0
     K, choice = scene.contact.stiffness, dict[str, float]()
     if "stiffness" in scene.chosen_fields:
         choice["stiffness"] = K = min(_up(SPARE_LOAD * load / sag), LARGEST_NUMBER)

@@ -164,9 +164,10 @@ class Hand(Part):
             found.append([a + f(t) for a, f in zip(force, functions, strict=True)] if functions else force)
         return found
 
-    def largest_force(self) -> float:
-        """Return the magnitude of the largest force [N] at t = 0 and at the times of the table's rows."""
+    def largest_force(self, duration: float = 0.0) -> float:
+        """Return the magnitude of the largest force [N] at t = 0, at the table's times and 200 times of a function."""
         times = [0.0, *(row[0] for row in self.force_table)]
+        times += [k * duration / 200.0 for k in range(201)] if self.force_function else []
         return max(math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in self.forces(times))
 
 

@@ -5,15 +5,32 @@ from __future__ import annotations
 import numpy as np
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.contact_set import find_islands
+from iapb.contact.kernels.contact_set import (
+    HOLDS,
+    LEFT,
+    STRIKES,
+    add_supports,
+    find_islands,
+    group_of_contact,
+    pair_restitution,
+)
 from iapb.contact.kernels.impact import factored_impact, project_impact, rank_tolerance
 from iapb.contact.kernels.impact_friction import add_impact_friction
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.passive import passive_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
-from iapb.contact.kernels.rows import body_row, contact_row, direction_row, friction_of, tangent_of
+from iapb.contact.kernels.rows import (
+    body_row,
+    contact_row,
+    contact_velocities,
+    direction_row,
+    friction_of,
+    tangent_of,
+)
+from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.contact.kernels.unilateral import poisson_impact
 from iapb.linalg import load
+from iapb.run import COLLIDING
 
 
 @kernel
@@ -80,13 +97,6 @@ def gather_tangents(world, state, size, count):
 
 
 @kernel
-def pair_restitution(own, a, b, otherwise):
-    """Return e of two shapes: the smaller of their values; `otherwise` if neither has one (both are above 1)."""
-    e = min(own[a], own[b])
-    return otherwise if e > 1.0 else e
-
-
-@kernel
 def gather_restitution(world, state, count):
     """Write the restitution of each row; return the smallest value, and whether the values differ."""
     contacts, smallest, largest = state.contacts, 1.0, 0.0
@@ -138,7 +148,7 @@ def apply_group(world, state, size, share):
         impulse = share * state.group_impulse[i]
         lost -= (v[i] + 0.5 * (share * change[i])) * impulse
         state.v[k] = after[i]
-        state.impulse[k] = impulse
+        state.impulse[k] = impulse if state.impulse[k] == 0.0 else state.impulse[k] + impulse
     return lost, share
 
 
@@ -155,7 +165,7 @@ def count_approaching(world, work, size, count, share):
 
 
 @kernel
-def log_impact(state, island, rows, rank, share, clamp, friction_share, solved, approaching, lost, size):
+def log_impact(state, island, rows, rank, share, applied, clamp, friction_share, solved, approaching, lost, size):
     """Append one line to the step's impacts."""
     log = state.impacts
     n = log.logged[0]
@@ -169,11 +179,11 @@ def log_impact(state, island, rows, rank, share, clamp, friction_share, solved, 
     for i in range(size):
         k = state.dofs[i]
         log.v_minus[n, k] = state.group_v[i]
-        log.impulse[n, k] = state.impulse[k]
+        log.impulse[n, k] = applied * state.group_impulse[i]
     log.logged[0] = n + 1
 
 
-@kernel(needs="unequal_restitution pushing", otherwise=(0, 1.0, False))
+@kernel(needs="unequal_restitution pushing implicit", otherwise=(0, 1.0, False))
 def resolve_unequal(world, state, size, count, smallest):
     """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e, which is passive."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
@@ -204,9 +214,9 @@ def resolve_rows(world, state, size, count):
     """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of friction, solved)."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
     work, e, unequal, solved, friction_share = state.work, world.restitution, False, True, 1.0
-    if world.switches.unequal_restitution or world.switches.pushing:
+    if world.switches.unequal_restitution or world.switches.pushing or world.implicit:
         e, unequal = gather_restitution(world, state, count)
-        unequal = unequal or world.switches.pushing
+        unequal = unequal or world.switches.pushing or holds_any(state, count)
     if unequal:
         rank, clamp, solved = resolve_unequal(world, state, size, count, e)
     else:
@@ -244,16 +254,75 @@ def resolve_island(world, state, island):
     approaching = count_approaching(world, state.work, size, count, applied)
     for r in range(count):
         if r == 0 or state.rows[r] != state.rows[r - 1]:  # of two per-body rows the first is the one on body a
-            state.contact_impulse[state.rows[r]] = applied * state.row_impulse[r]
-    log_impact(state, island, count, rank, share, clamp, friction_share, solved and clamp > 0.0, approaching, lost,
-               size)
+            i, impulse = state.rows[r], applied * state.row_impulse[r]
+            before = state.contact_impulse[i]
+            state.contact_impulse[i] = impulse if before == 0.0 else before + impulse
+    log_impact(state, island, count, rank, share, applied, clamp, friction_share, solved and clamp > 0.0, approaching,
+               lost, size)
+
+
+@kernel
+def holds_any(state, count):
+    """Return whether any of the rows belongs to a contact that only holds."""
+    for r in range(count):  # noqa: SIM110 - a kernel has no generators
+        if state.contacts.mark[state.rows[r]] == HOLDS:
+            return True
+    return False
 
 
 @kernel
 def resolve_collisions(world, state):
-    """Give every colliding group its impulse, island by island; velocities change, configurations do not."""
+    """Give every colliding group its impulse, island by island; velocities change, configurations do not.
+
+    With implicit contact, contacts that carry a load only push (Poisson's law). What approaches because of an impact
+    collides in its turn, as the balls of a cradle that touch.
+    """
+    add_supports(world, state)
     if not find_islands(world, state):
         return
+    resolve_islands(world, state)
+    while strike_again(world, state):
+        resolve_islands(world, state)
+
+
+@kernel
+def resolve_islands(world, state):
+    """Resolve the impacts of all islands that collide."""
     for t in range(world.tree_start.shape[0]):
         if state.collides_of_tree[t]:
             resolve_island(world, state, t)
+
+
+@kernel(needs="implicit", otherwise=False)
+def strike_again(world, state):
+    """Find the contacts of colliding groups that impacts have made approach; return False if there are none.
+
+    The impacts of a step are at most as many as its log has lines. What is left strikes in the next step.
+    """
+    contacts, now, count, some = state.contacts, state.stage_contacts, state.contact_count[0], False
+    if not world.implicit or world.switches.impulse_limit:
+        return False
+    for i in range(count):
+        copy_contact(now, i, contacts, i)
+    contact_velocities(world.mechanism, state.body, state.v, now, count)
+    for i in range(count):
+        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
+                                 state.group_of_tree)
+        e = pair_restitution(world.own_restitution, contacts.shape_a[i], contacts.shape_b[i], world.restitution)
+        if (group >= 0 and state.state_of_tree[group] == COLLIDING and contacts.gap[i] <= 0.0 and e > 0.0
+                and now.normal_velocity[i] < -world.approach_velocity):
+            contacts.mark[i], contacts.collides[i], some = STRIKES, True, True
+        elif contacts.mark[i] == STRIKES:
+            contacts.mark[i], contacts.collides[i] = 0, False
+    if not some:
+        return False
+    find_islands(world, state)
+    islands = 0
+    for t in range(world.tree_start.shape[0]):
+        islands += state.collides_of_tree[t]
+    if state.impacts.logged[0] + islands <= state.impacts.group.shape[0]:
+        return True
+    for i in range(count):
+        if contacts.mark[i] == STRIKES:
+            contacts.mark[i] = LEFT
+    return False

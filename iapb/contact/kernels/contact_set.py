@@ -16,7 +16,10 @@ ALIGNED_COSINE = 0.85
 # An overlap up to this [m] counts as touching: rounding of positions causes it, and its penalty force is negligible.
 TOUCHING = 1e-12
 
-_UNDECIDED, _KEPT, _DROPPED = 0, 1, 2
+_UNDECIDED, _KEPT, _DROPPED = 0, 1, 2  # marks while contacts are clustered
+
+# Marks in an impact under implicit contact: it strikes, it carries a load, it would strike but the log is full.
+STRIKES, HOLDS, LEFT = 1, 2, 3
 
 
 @kernel
@@ -89,7 +92,7 @@ def _close_ranks(contacts, count):
         if contacts.mark[i] != _KEPT:
             continue
         if row < i:
-            copy_contact(contacts, row, i)
+            copy_contact(contacts, row, contacts, i)
         row += 1
 
 
@@ -130,6 +133,18 @@ def _is_same(contacts, i, previous, j, distance, cosine):
     if not same_surface(contacts, i, previous, j, cosine):
         return False
     return squared_distance(contacts, i, previous, j) <= distance * distance
+
+
+@kernel
+def contact_before(state, i, begin):
+    """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
+    now, before, total = state.contacts, state.previous, state.contact_count[1]
+    for k in range(total):
+        j = begin + k if begin + k < total else begin + k - total
+        if (now.shape_a[i] == before.shape_a[j] and now.shape_b[i] == before.shape_b[j]
+                and now.feature[i] == before.feature[j]):
+            return j
+    return -1
 
 
 @kernel
@@ -246,8 +261,39 @@ def find_islands(world, state):
     for t in range(start.shape[0]):
         state.island_of_tree[t] = state.island_of_tree[state.island_of_tree[t]]  # smaller trees are settled already
     for i in range(state.contact_count[0]):
-        if contacts.collides[i]:
+        if contacts.collides[i] and (not world.implicit or contacts.mark[i] == STRIKES):
             state.collides_of_tree[
                 group_of_contact(contacts, i, world.tree_of_body, start, stop, state.island_of_tree)
             ] = True
     return True
+
+
+@kernel
+def pair_restitution(own, a, b, otherwise):
+    """Return e of two shapes: the smaller of their values; `otherwise` if neither has one (both are above 1)."""
+    e = min(own[a], own[b])
+    return otherwise if e > 1.0 else e
+
+
+@kernel(needs="implicit")
+def add_supports(world, state):
+    """Mark what strikes; of a colliding group, contacts that carry a load enter the impact, too.
+
+    Without them the body struck would move into its support, and resting contact would stop it: a ball would hardly
+    bounce on a book that lies on the floor. Where nothing bounces, resting contact stops all, with friction.
+    """
+    contacts, begin, bounces = state.contacts, 0, False
+    for i in range(state.contact_count[0] if world.implicit else 0):
+        contacts.mark[i] = STRIKES if contacts.collides[i] else 0
+        bounces = bounces or contacts.collides[i] and pair_restitution(
+            world.own_restitution, contacts.shape_a[i], contacts.shape_b[i], world.restitution) > 0.0
+    for i in range(state.contact_count[0] if bounces else 0):
+        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
+                                 state.group_of_tree)
+        if group < 0 or state.state_of_tree[group] != COLLIDING or contacts.collides[i] or contacts.gap[i] > 0.0:
+            continue
+        before = contact_before(state, i, begin)
+        if before >= 0:
+            begin = before + 1
+            if state.previous.normal_force[before] > 0.0:
+                contacts.mark[i], contacts.collides[i] = HOLDS, True

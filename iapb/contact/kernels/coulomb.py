@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.contact_set import moving_tree
+from iapb.contact.kernels.contact_set import contact_before, moving_tree
 from iapb.contact.kernels.impact_friction import slide, tangent_inertia
 from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
 from iapb.linalg import add, add_multiple, dot, dot_of, load, scale, solve_tree_blocks, store
@@ -45,13 +45,6 @@ def make_step_friction(coordinates: int, contacts: int, tangents: int, tree_size
     c, m, width = contacts, tangents, 2 * tree_size
     shapes: tuple[Any, ...] = ((c * m, width), c * m, c * m, c, c, coordinates, width, m)
     return StepFriction(np.zeros(c, np.int64), np.zeros((c, 2), np.int64), *map(np.zeros, shapes))
-
-
-@kernel
-def remember_friction(state):
-    """Copy the friction forces of the last step to `previous`; the sweeps start from them."""
-    for i in range(state.contact_count[0]):
-        store(state.previous.friction_force, i, load(state.contacts.friction_force, i))
 
 
 @kernel(needs="coulomb")
@@ -125,18 +118,6 @@ def _gather(world, state):
         f.inertia[count] = tangent_inertia(f.rows, count * size, size)
         count += 1
     return count
-
-
-@kernel
-def contact_before(state, i, begin):
-    """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
-    now, before, total = state.contacts, state.previous, state.contact_count[1]
-    for k in range(total):
-        j = begin + k if begin + k < total else begin + k - total
-        if (now.shape_a[i] == before.shape_a[j] and now.shape_b[i] == before.shape_b[j]
-                and now.feature[i] == before.feature[j]):
-            return j
-    return -1
 
 
 @kernel

@@ -22,8 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.contact_set import group_of_contact, moving_tree
-from iapb.contact.kernels.coulomb import contact_before
+from iapb.contact.kernels.contact_set import LEFT, contact_before, group_of_contact, moving_tree
 from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
 from iapb.linalg import add, load, scale, store
 
@@ -32,6 +31,7 @@ EXACT = 1e-20  # share of the energy of a step that the open balance of momentum
 GOOD = 1e-14  # the same, where rounding allows no better
 ITERATIONS = 60  # of Newton's method for given limits of friction
 TURNS = 12  # of the limits of friction in a step; the next step goes on from the last ones
+FREE_TURNS = 3  # of these take the new limits whole; the others half, for limits that swing to and fro
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
 SEARCHES = 40  # evaluations of a line search
 GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
@@ -95,7 +95,7 @@ def list_groups(world, state):
         store(contacts.friction_force, i, (0.0, 0.0, 0.0))
         group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
                                  state.group_of_tree)
-        if group >= 0 and contacts.gap[i] <= 0.0:
+        if group >= 0 and contacts.gap[i] <= 0.0 and contacts.mark[i] != LEFT:
             work.next[i], work.first[group], some = work.first[group], i, True
     if some:
         work.next_tree[:] = -1
@@ -113,8 +113,8 @@ def rest_group(world, state, group, s):
     count = gather_contacts(world, state, group, s)
     k = world.stiffness * world.dt + world.damping
     solved = solve(world, state, size, count, s, k)
-    for _ in range(TURNS if s > 1 else 0):
-        if not follow_limits(world, state, count, s):
+    for turn in range(TURNS if s > 1 else 0):
+        if not follow_limits(world, state, count, s, 1.0 if turn < FREE_TURNS else 0.5):
             break
         solved = solve(world, state, size, count, s, k)
     guard(world, state, size, count, s, solved)
@@ -470,8 +470,8 @@ def line_search(world, state, size, count, s, k):
 
 
 @kernel
-def follow_limits(world, state, count, s):
-    """Set the limits of friction to those of the present normal impulses; return whether any changed noticeably."""
+def follow_limits(world, state, count, s, share):
+    """Move the limits of friction by a share towards those of the present impulses; False: none changed noticeably."""
     work, changed, largest = state.rest_work, False, 0.0
     for r in range(count):
         largest = max(largest, work.p[r * s])
@@ -479,7 +479,7 @@ def follow_limits(world, state, count, s):
         limit = friction_of(world, state.contacts, work.contact[r]) * work.p[r * s]
         most = max(limit, work.limit[r])
         changed = changed or abs(limit - work.limit[r]) > SETTLED * most and most > SETTLED * SETTLED * largest
-        work.limit[r] = limit
+        work.limit[r] += share * (limit - work.limit[r])
     return changed
 
 

@@ -107,10 +107,9 @@ def store_in_space(buffer, count, shapes, a, b, feature, point, normal, gap):
 
 
 @kernel
-def copy_contact(buffer, target, source):
-    """Copy the geometry of row `source` to row `target`."""
-    buffer.shape_a[target], buffer.shape_b[target] = buffer.shape_a[source], buffer.shape_b[source]
-    buffer.body_a[target], buffer.body_b[target] = buffer.body_a[source], buffer.body_b[source]
-    buffer.feature[target], buffer.gap[target] = buffer.feature[source], buffer.gap[source]
-    store(buffer.point, target, load(buffer.point, source))
-    store(buffer.normal, target, load(buffer.normal, source))
+def copy_contact(to, i, contacts, j):
+    """Copy the geometry of contact j to row i of the buffer `to`."""
+    to.shape_a[i], to.shape_b[i], to.feature[i] = contacts.shape_a[j], contacts.shape_b[j], contacts.feature[j]
+    to.body_a[i], to.body_b[i], to.gap[i] = contacts.body_a[j], contacts.body_b[j], contacts.gap[j]
+    store(to.point, i, load(contacts.point, j))
+    store(to.normal, i, load(contacts.normal, j))

@@ -375,7 +375,7 @@ def _swap_in(buffer, target, source):
     a, b, feature, gap = buffer.shape_a[target], buffer.shape_b[target], buffer.feature[target], buffer.gap[target]
     body_a, body_b = buffer.body_a[target], buffer.body_b[target]
     point, normal = load(buffer.point, target), load(buffer.normal, target)
-    copy_contact(buffer, target, source)
+    copy_contact(buffer, target, buffer, source)
     buffer.shape_a[source], buffer.shape_b[source] = a, b
     buffer.body_a[source], buffer.body_b[source] = body_a, body_b
     buffer.feature[source], buffer.gap[source] = feature, gap

@@ -9,14 +9,25 @@ from __future__ import annotations
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
-from iapb.contact.kernels.contact_set import classify, cluster, group_of_contact, mark_new
-from iapb.contact.kernels.coulomb import add_step_friction, remember_friction
+from iapb.contact.kernels.contact_set import TOUCHING, classify, cluster, group_of_contact, mark_new
+from iapb.contact.kernels.coulomb import add_step_friction
 from iapb.contact.kernels.implicit import rest_implicitly
 from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities, friction_of
-from iapb.linalg import add, cholesky, cholesky_tree_blocks, scale, solve_mass, solve_tree_blocks, subtract
+from iapb.contact.kernels.shape_frames import copy_contact
+from iapb.linalg import (
+    add,
+    cholesky,
+    cholesky_tree_blocks,
+    load,
+    scale,
+    solve_mass,
+    solve_tree_blocks,
+    store,
+    subtract,
+)
 from iapb.mechanics.joints import SPHERICAL
 from iapb.mechanics.kernels.configuration import integrate, integrate_body
 from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
@@ -109,17 +120,9 @@ def is_located(state):
 def find_contacts(world, state):
     """Find the contacts (section III): cluster them, mark new ones, classify groups; return how many, -1: too many."""
     remember(state)
-    if world.coulomb and not world.implicit:
-        remember_friction(state)
-    count = touching(world, state, state.contacts)
+    count = present_contacts(world, state, state.contacts)
     if count < 0:
         return count
-    if world.switches.clustering:
-        count = cluster(state.contacts, count, world.cluster_distance)
-    if world.switches.joint_limits:
-        count = add_stops(world.mechanism, world.stops, state.body, state.q, 0.0, state.contacts, count)
-        if count < 0:
-            return count
     state.contact_count[0] = count
     state.contact_impulse[:count] = 0.0
     contact_velocities(world.mechanism, state.body, state.v, state.contacts, count)
@@ -134,29 +137,33 @@ def find_contacts(world, state):
 
 
 @kernel
-def touching(world, state, contacts):
-    """Run the narrow phase, with the broad phase if it is on; return the number of contacts, -1: too many."""
-    R, p = state.body.rotation, state.body.position
-    if not world.switches.broad_phase:
-        return detect(world.shapes, world.pairs, R, p, 0.0, contacts)
-    near = near_pairs(world.broad_phase, R, p, 0.0)
-    if near < 0:
-        return -1
-    return detect(world.shapes, world.broad_phase.pairs[:near], R, p, 0.0, contacts)
+def present_contacts(world, state, contacts):
+    """Find, cluster and complete the contacts of the present configuration; return how many, -1: too many."""
+    R, p, pairs = state.body.rotation, state.body.position, world.pairs
+    margin = TOUCHING if world.implicit else 0.0  # all corners of a face that touches, whatever its rounding
+    if world.switches.broad_phase:
+        near = near_pairs(world.broad_phase, R, p, margin)
+        if near < 0:
+            return -1
+        pairs = world.broad_phase.pairs[:near]
+    count = detect(world.shapes, pairs, R, p, margin, contacts)
+    for i in range(count):
+        contacts.gap[i] = min(contacts.gap[i], 0.0)
+    if world.switches.clustering:
+        count = cluster(contacts, count, world.cluster_distance)
+    if world.switches.joint_limits and count >= 0:
+        count = add_stops(world.mechanism, world.stops, state.body, state.q, 0.0, contacts, count)
+    return count
 
 
 @kernel
 def remember(state):
-    """Copy the contacts of the last step to `previous`, with which `mark_new` compares."""
+    """Copy the contacts and forces of the last step to `previous`: `mark_new` and friction compare with them."""
     now, before = state.contacts, state.previous
     for i in range(state.contact_count[0]):
-        before.shape_a[i], before.shape_b[i] = now.shape_a[i], now.shape_b[i]
-        before.body_a[i], before.body_b[i] = now.body_a[i], now.body_b[i]
-        before.feature[i], before.gap[i] = now.feature[i], now.gap[i]
+        copy_contact(before, i, now, i)
         before.normal_force[i] = now.normal_force[i]
-        for axis in range(3):
-            before.point[i, axis] = now.point[i, axis]
-            before.normal[i, axis] = now.normal[i, axis]
+        store(before.friction_force, i, load(now.friction_force, i))
     state.contact_count[1] = state.contact_count[0]
 
 
@@ -384,11 +391,7 @@ def rest(world, state, stage):
     contacts, count = state.contacts, state.contact_count[0]
     if stage > 0:
         contacts = state.stage_contacts
-        count = touching(world, state, contacts)
-        if world.switches.clustering:
-            count = cluster(contacts, count, world.cluster_distance)
-        if world.switches.joint_limits:
-            count = add_stops(world.mechanism, world.stops, state.body, state.q, 0.0, contacts, count)
+        count = present_contacts(world, state, contacts)
         contact_velocities(world.mechanism, state.body, state.v, contacts, count)
     for i in range(count):
         contacts.normal_force[i] = 0.0
