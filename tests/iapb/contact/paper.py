@@ -18,7 +18,6 @@ from iapb.scene.model import scene_kind
 from iapb.system import System
 
 Floats = NDArray[np.float64]
-FREE, COLLIDING, RESTING = 0, 1, 2
 ALIGNED, TOUCHING = 0.85, 1e-12  # cosine of the normals of one surface; overlap [m] that still counts as touching
 
 
@@ -27,6 +26,11 @@ def scene_of(bodies: list[dict[str, Any]], walls: list[dict[str, Any]], **values
     space = {"dimensions": 3} if any(body["joint"] == "free_flyer" for body in bodies) else {}
     given = {"name": "made", "rate": 1000.0, "duration": 0.1, "bodies": bodies, "walls": walls} | space | values
     return scene_kind(given).model_validate(given)
+
+
+def in_space(scene: Scene) -> bool:
+    """Whether bodies of the scene turn about three axes."""
+    return hasattr(scene.bodies[0], "rpy")
 
 
 # --- geometry ------------------------------------------------------------------------------------------------------
@@ -52,10 +56,6 @@ class Solid(NamedTuple):
     axes: Floats = np.zeros(0)
     half: Floats = np.zeros(0)
 
-    def flipped(self, touches: list[Touch]) -> list[Touch]:
-        """The same contacts with both sides exchanged."""
-        return [Touch(point, -normal, gap) for point, normal, gap in touches]
-
 
 def turned(angles: Any) -> Floats:
     """Rotation by an angle in the plane, or by roll, pitch and yaw in space."""
@@ -72,7 +72,7 @@ def turned(angles: Any) -> Floats:
 def solids(scene: Scene, mechanism: Mechanism, q: Floats) -> list[Solid]:
     """Every shape of the scene at q, bodies first."""
     frames, places = mechanism.placements(q)
-    n = 3 if "rpy" in type(scene.bodies[0]).model_fields else 2
+    n = 3 if in_space(scene) else 2
     found = [_solid(shape, k, frames[k][:n, :n], places[k][:n])
              for k, body in enumerate(scene.bodies) for shape in body.shapes]
     return found + [_solid(wall, -1, np.eye(n), np.zeros(n)) for wall in scene.walls]
@@ -111,8 +111,13 @@ def touches(a: Solid, b: Solid) -> list[Touch]:
         gap = distance - a.radius
         return [Touch(a.center - (a.radius + gap / 2) * normal, normal, gap)]
     if b.kind == "ball":
-        return a.flipped(touches(b, a))
+        return flipped(touches(b, a))
     return polygons(a, b) if a.kind == "polygon" else boxes(a, b)
+
+
+def flipped(found: list[Touch]) -> list[Touch]:
+    """The same contacts with both sides exchanged."""
+    return [Touch(point, -normal, gap) for point, normal, gap in found]
 
 
 def _out_of(b: Solid, x: Floats) -> tuple[Floats, float]:
@@ -197,7 +202,7 @@ def boxes(a: Solid, b: Solid) -> list[Touch]:
         s, t = np.linalg.lstsq(np.column_stack([one, -two]), end - start)[0]
         s, t = np.clip(s, -a.half[x], a.half[x]), np.clip(t, -b.half[y], b.half[y])
         return [Touch((start + s * one + end + t * two) / 2, n, edge)]
-    return faces(a, b, i, most) if by_a else a.flipped(faces(b, a, k, of_b[k]))
+    return faces(a, b, i, most) if by_a else flipped(faces(b, a, k, of_b[k]))
 
 
 def faces(a: Solid, b: Solid, k: int, separation: float) -> list[Touch]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from iapb.errors import IapbError
 from iapb.scene import Scene
 from iapb.simulation import simulate
 from iapb.system import System
@@ -290,3 +291,18 @@ def test_bodies_that_have_left_the_range_of_cells_are_found_too() -> None:
     run = simulate(scene_of(bodies, []), steps=1)
     assert list(zip(run.contacts.body_a, run.contacts.body_b, strict=True)) == [(18, 19)]
 
+
+@pytest.mark.parametrize(("a", "b", "place", "gap", "number"), [each for each in EXACT if each[-1] > 1])
+def test_more_contacts_than_there_is_room_for_are_an_error(
+    a: Values, b: Values, place: list[float], gap: float, number: int
+) -> None:
+    system = pair_of(a, b)
+    system.capacity = number - 1
+    with pytest.raises(IapbError):
+        system.contacts_at(at_places(system, place, *([[0.0] * len(place)] if "normal" not in b else [])), gap)
+
+
+def test_a_hundred_discs_on_one_place_are_more_than_a_run_has_room_for() -> None:
+    bodies = [{"name": f"d{k}", "joint": "planar", "mass": 0.1, "inertia": 1e-5, "shapes": [DISC]} for k in range(100)]
+    with pytest.raises(IapbError):
+        simulate(scene_of(bodies, []), steps=1)

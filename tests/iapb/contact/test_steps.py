@@ -10,17 +10,15 @@ import pytest
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.mechanics.integrators import INTEGRATORS
-from iapb.run import Run
+from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
 from iapb.system import System
 from tests.iapb.contact.paper import (
-    COLLIDING,
-    FREE,
-    RESTING,
     Contact,
     contacts_of,
     impact,
+    in_space,
     is_new,
     linked,
     own_values,
@@ -206,7 +204,7 @@ class Step:
         values = [own_values(self.scene, self.contacts[i]) for i in chosen]
         e = np.array([value[0] for value in values])
         if self.law.friction_in_impacts:
-            T = np.array([tangents_of(self.contacts[i].normal, self.m.nv > 20) @ self.jacobians[i][:, dofs]
+            T = np.array([tangents_of(self.contacts[i].normal, in_space(self.scene)) @ self.jacobians[i][:, dofs]
                           for i in chosen])
             found = resolve_frictional_impact(M, J, T, v, e[0], [value[1] for value in values])
             return found.velocity, found.impulses, found.friction_share, found.status == "complete"
