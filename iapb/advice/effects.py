@@ -278,7 +278,8 @@ EFFECTS: dict[str, Rule] = {
     # extensions in the paper: here Poisson's law (rigid constraints: Newton's where it gains no energy), and Coulomb's.
     "impulses": Rule(lambda q: f"new contacts collide: {_by_pair(q, 'restitution')}",
                      "bodies would be stopped by springs alone and sink in further",
-                     parts=(IMPULSES, OWN_RESTITUTION), ignores="restitution"),
+                     lambda q: f"{_by_pair(q, 'restitution')}: an impulse would be zero"
+                     if q.facts.restitutions[-1] == -1.0 else "", (IMPULSES, OWN_RESTITUTION), ignores="restitution"),
     "unequal_restitution": Rule(
         lambda q: f"pairs that can touch differ: {_by_pair(q, 'restitution')}",
         "all contacts of a collision would bounce alike",
@@ -295,7 +296,7 @@ EFFECTS: dict[str, Rule] = {
         + ": chosen for small sags" * ("stiffness" in q.scene.contact.chosen), "stiffness"),
     "contact_damping": _contact(
         "damping", "N s/m", PENALTY, "resting contacts would swing on their springs",
-        lambda q: ": chosen so that overlaps fade in 10 ms" * ("damping" in q.scene.contact.chosen), "damping"),
+        lambda q: ": chosen so that overlaps fade in 0.1 s" * ("damping" in q.scene.contact.chosen), "damping"),
     "friction": Rule(lambda q: _by_pair(q, "friction"), "bodies would slide along each other without loss", _smooth,
                      (FRICTION,), ignores="friction"),
     # section III: contacts close together count as one; a contact near one of the step before is not new

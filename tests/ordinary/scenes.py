@@ -472,7 +472,7 @@ NARROW = [{"name": f"side_{i}", "kind": "half_plane", "point": [0, 0], "normal":
           for i, side in enumerate((1, -1))]  # fmt: skip
 add_standing("ball_in_groove", scene(1.0, [disc("ball", 0.01, 0.05, (0, 0.01 / SIN, 0))], NARROW), 0.01)
 
-# Statics with friction: grooves, wedges, an arch, pegs, ladders, dominoes
+# Statics with friction: grooves, wedges, an arch, pegs, ladders, dominoes; impacts on what rests or touches
 
 GROOVE = [{"name": f"side_{i}", "kind": "half_plane", "point": [0, 0], "normal": [side, 1.0]}
           for i, side in enumerate((1, -1))]  # fmt: skip
@@ -566,6 +566,21 @@ add_standing("ladder_stands", ladder(0.3, math.radians(60), 1.0), LENGTH / 2)
 FELL = math.radians(50) - slipped(0.3, math.radians(50), 0.5)
 add("ladder_slips", ladder(0.3, math.radians(50), 0.5), lambda motion: motion.angle()[-1] - motion.angle()[0],
     FELL, FELL, "slips at both ends, DOP853")
+for mass in (0.005, 0.3, 10.0):
+    add(f"ball_on_book_of_{1000 * mass:g}_g",
+        scene(0.5, [box("book", 0.2, 0.02, mass, (0, 0.01, 0)), disc("ball", 0.03, 0.3, (0, 0.35, 0))], [FLOOR],
+              restitution=0.8),
+        lambda motion: float(motion.place[300:, 1, 1].max()) - 0.05, 0.64 * 0.3, 0.3, "rises to e² of its height", 0.02)
+add("row_that_touches",
+    scene(0.4, [disc(f"disc_{i}", 0.03, 0.1, (0.06 * i - (0.2 if i == 0 else 0.06), 0, 0), (1.0 if i == 0 else 0, 0, 0))
+                for i in range(4)], restitution=1.0, gravity=0.0),
+    lambda motion: (motion.place[-1, :, 0] - motion.place[-101, :, 0]) * 10.0, [0, 0, 0, 1], 1.0,
+    "the last one leaves")
+add("plastic_drop", scene(0.8, [disc("disc", 0.03, 0.1, (0, 1.03, 0))], [FLOOR]),
+    lambda motion: float(motion.place[500:, 0, 1].max()) - 0.03, 0.0, 1.0, "stays down", 1e-3)
+add("pushed_by_a_function", scene(0.5, [box("box", 0.1, 0.1, 0.1, (0, 0.05, 0))], [FLOOR],
+                                  hand={"body": "box", "force_function": ["0", "-1000*sin(t)", "0"]}),
+    lambda motion: float(motion.place[:, 0, 1].min()) - 0.05, 0.0, 0.1, "sags below a thousandth of its height", 1e-3)
 DOMINOES = [box(f"domino_{i}", 0.02, 0.1, 0.05, (0.05 * i, 0.05, 0), (0.2, 0.04, -4) if i == 0 else (0, 0, 0))
             for i in range(5)]  # fmt: skip
 PLATE_2D = {"name": "plate", "kind": "box", "size": [0.01, 0.2], "center": [0, 0]}
