@@ -73,7 +73,7 @@ class _Seen:
         self.carried = run.tool_dofs if run.coupling == "unilateral" else (0, 0)
 
     def trifle(self, bodies: Booleans) -> float:
-        """Negligible energy [J] of some bodies: to lift each by a thousandth of its size, and rounding of the scene's."""
+        """Negligible energy [J] of some bodies: to lift each by a thousandth of its size; and rounding of the scene."""
         rounding = 1e-14 * float(self.run.energy["kinetic"].max(initial=0.0)) if "kinetic" in self.run.energy else 0.0
         weights = np.linalg.norm(self.gravity) * np.array([body.mass for body in self.bodies])
         return rounding + float((1e-3 * weights * np.where(np.isinf(self.sizes), 0.0, self.sizes)[:-1])[bodies].sum())
