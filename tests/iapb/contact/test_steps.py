@@ -92,6 +92,11 @@ def pushed_peg(**values: Any) -> Scene:
     return shipped("peg_corner", **start, contact__friction=0.1, **values)
 
 
+def held(scene: Scene) -> Scene:
+    """The third body in a hand, with a device so weak that the impulses of its whole group are scaled."""
+    return scene.with_values({"hand": {"body": "b2", "force": [0.5, 0, 0]}, "device": {"force_limit": [40, 30, 2]}})
+
+
 def touching_row() -> Scene:
     """Five discs in a row, struck: the gaps of four are zero to the last bit, so their contacts never had a force."""
     bodies = [{"name": f"d{k}", "joint": "planar", "mass": 1.0, "inertia": 1e-4, "position": [0.03125 * k, 0, 0],
@@ -136,6 +141,8 @@ CASES: dict[str, tuple[Scene, Any]] = {
     "plane, Runge-Kutta, filters": (pit(False, cluster_distance=0.15, damping=20), Penalty("runge_kutta_4")),
     "space, midpoint": (pit(True, damping=20), ImpulseAugmented("midpoint")),
     "arm, Runge-Kutta": (swinging(0.0), ImpulseAugmented("runge_kutta_4")),
+    "plane, scaled group": (held(pit(False)), ImpulseAugmented(rendering="scale")),
+    "plane, spread group": (held(pit(False)), ImpulseAugmented(rendering="spread")),
     "peg, scaled": (pushed_peg(contact__restitution=0.6), ImpulseAugmented(rendering="scale")),
     "peg, spread": (pushed_peg(), ImpulseAugmented(rendering="spread")),
 }
@@ -345,4 +352,4 @@ def test_every_step_is_the_papers(name: str) -> None:
         before, seen = step.contacts, seen | set(step.states)
     assert COLLIDING in seen if law.impulses else RESTING in seen
     assert RESTING in seen or "cradle" in name
-    assert name != "peg, spread" or (run.impacts.scale < 1.0).any()
+    assert getattr(law, "rendering", "full") == "full" or (run.impacts.scale < 1.0).any()
