@@ -3,52 +3,49 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property, lru_cache, partial
-from itertools import chain
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.advice.distrust import distrust_of
-from iapb.advice.effects import Effect
-from iapb.compiled import address_of, block, columns, copy_into, kernel
+from iapb.compiled import block, columns, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
 from iapb.haptics.kernels import PLANNED
 from iapb.linalg import load, store
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.mechanism import Mechanism
-from iapb.run import ContactTable, EffectRow, ImpactTable, Later, Run, blank, digests, quantities
+from iapb.run import ContactTable, EffectRow, ImpactTable, Later, Run, digests
 from iapb.scene.model import SpatialScene
-
-Floats = NDArray[np.float64]
-Start = tuple[dict[str, Floats], dict[str, float]]  # state and energy at the first instant
+from iapb.schema import Floats, Quantity, blank, quantities
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
-_ROOM = 30e6  # bytes of consecutive chunks together, unless one chunk is larger
+_ROOM = 30e6  # bytes of a record, unless one chunk is larger
 _BATCH = 50_000_000  # bytes of mass matrices held at once
 _STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C work at least that often
 
 # Arrays that the loop writes; poses, energies and digests of M are computed from them.
 STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")
-STEPS = quantities(Run, "step")
+STEPS = (*quantities(Run, "step"), Quantity("contact_count", ("step",), np.int64, "1", "contacts of the step"))
 CONTACTS = quantities(ContactTable, "contact")
 IMPACTS = tuple(each for each in quantities(ImpactTable) if each.name != "mass_digest")
-_LINES = {"steps": STATES + STEPS, "contacts": CONTACTS, "impacts": IMPACTS}
+LINES = {"steps": STATES + STEPS, "contacts": CONTACTS, "impacts": IMPACTS}
 _KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
                       "device_actuator_work")
 
+Coordinates = tuple[int, int, int, int]
+
 
 class Record(NamedTuple):
-    """Arrays of one chunk of n steps, with the names of `iapb.run`."""
+    """Memory for up to n steps of at most c contacts and t trees, with the names of `iapb.run`."""
 
-    used: np.ndarray  # (2,) int64: contacts and impacts written so far
-    contact_count: np.ndarray  # (n,) int64
+    used: np.ndarray  # (3,) int64: steps, contacts and impacts written so far
     steps: Any  # n lines, with the states at the *end* of each step
-    contacts: Any  # up to m lines, where m is the capacity of the chunk
-    impacts: Any  # up to n t lines, one per island and step, with t trees
+    contacts: Any  # n c lines
+    impacts: Any  # n t lines, one per island and step
 
 
 def chunk_steps(contacts: int, remaining: int) -> int:
@@ -61,86 +58,33 @@ def bytes_per_step(simulation: Any) -> int:
     return 2 * _line_bytes(coordinates_of(simulation), 0, 0) + 8 * len(FORCES) + 40
 
 
-def coordinates_of(simulation: Any) -> tuple[int, int, int, int]:
+def coordinates_of(simulation: Any) -> Coordinates:
     """Return the lengths of q and v, of the scene and of the device."""
     mechanism, port = simulation.system.mechanism, simulation.port
     return mechanism.nq, mechanism.nv, len(port.device_q), len(port.device_v)
 
 
-@lru_cache(maxsize=8)
-def _line_bytes(coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> int:
+def _line_bytes(coordinates: Coordinates, contacts: int, trees: int) -> int:
     """Return the bytes of the lines of a step with so many contacts and trees."""
-    return sum(array.nbytes for array in chain(*_lines(1, coordinates, contacts, trees, np.empty).values()))
+    lines = _lines(1, coordinates, contacts, trees)
+    return sum(array.nbytes for arrays in lines.values() for array in arrays.values())
 
 
-def make_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Record:
-    """Allocate one chunk; `coordinates` = (nq, d, nq_t, d_t)."""
-    return Room(steps, coordinates, contacts, trees).record(steps)
+def make_record(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> Any:
+    """Allocate a record; `coordinates` = (nq, d, nq_t, d_t)."""
+    lines = _lines(steps, coordinates, contacts, trees)
+    return block(Record(np.zeros(3, np.int64), **{name: columns(f"{name}_lines", lines[name]) for name in LINES}))
 
 
-@lru_cache(maxsize=8)
-def _first_record(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> Any:
-    """Make a chunk that serves as the layout for others of its shape; its zeros take no memory."""
-    lines = _lines(steps, coordinates, contacts, trees, np.zeros)
-    return block(Record(np.zeros(2, np.int64), np.zeros(steps, np.int64), **lines))
-
-
-def _lines(steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int,
-           make: Callable[..., Any]) -> dict[str, Any]:
+def _lines(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> dict[str, dict[str, NDArray[Any]]]:
     lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
     lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
-    return {name: columns(f"{name}_lines", blank(listed, lengths, make)) for name, listed in _LINES.items()}
-
-
-class Room:
-    """Memory for consecutive chunks: the lines of a run that fits in need no joining.
-
-    Parameters
-    ----------
-    steps : number of steps of all chunks together
-    coordinates, contacts, trees : see `make_record`
-    """
-
-    def __init__(self, steps: int, coordinates: tuple[int, int, int, int], contacts: int, trees: int) -> None:
-        self._most, self._sizes = steps, (coordinates, contacts, trees)
-        self.counts = np.empty(steps, np.int64)
-        self.lines = _lines(steps, *self._sizes, np.empty)
-        self._arrays = [self.counts, *chain(*self.lines.values())]
-        self._table = [0] * (1 + len(STATES + STEPS)) + [1] * len(CONTACTS) + [2] * len(IMPACTS)
-        self._places = np.array([address_of(array) for array in self._arrays])
-        self._strides = np.array([array.strides[0] for array in self._arrays])
-        self.chunks = 0
-        self.used = [0, 0, 0]  # numbers of kept steps, contacts and impacts
-        self._open: Any = None  # the chunk that is being written
-
-    def fits(self, steps: int) -> bool:
-        """Whether the last chunk is kept and there is room for another one."""
-        return self._open is None and self.used[0] + steps <= self._most
-
-    def record(self, steps: int) -> Record:
-        """Return the next chunk; its content is not initialised."""
-        coordinates, contacts, trees = self._sizes
-        used, sizes = np.zeros(2, np.int64), (steps, steps * contacts, steps * trees)
-        arrays = [array[self.used[t] : self.used[t] + sizes[t]]
-                  for array, t in zip(self._arrays, self._table, strict=True)]
-        places = np.array([address_of(used), *self._places])
-        places[1:] += self._strides * np.array(self.used)[self._table]
-        self._open = _first_record(steps, coordinates, contacts, trees).on([used, *arrays], places)
-        made: Record = self._open
-        return made
-
-    def keep(self, record: Any, steps: int) -> bool:
-        """Keep the lines written to the open chunk; return False if `record` is another one."""
-        if record is not self._open:
-            return False
-        self._open, self.chunks = None, self.chunks + 1
-        self.used = [used + more for used, more in zip(self.used, (steps, *record.used.tolist()), strict=True)]
-        return True
+    return {name: blank(listed, lengths, np.empty) for name, listed in LINES.items()}
 
 
 @kernel
 def write_step(record, k, step, state, port):
-    """Copy step number `step` into line k of the chunk."""
+    """Copy step number `step` into line k of the record."""
     line = record.steps
     for i in range(state.q.shape[0]):
         line.q[k, i] = state.q[i]
@@ -158,17 +102,17 @@ def write_step(record, k, step, state, port):
         line.device_v[k, i] = port.device_v[i]
         line.device_force[k, i] = port.device_force[i]
     line.state[k] = contact_state(state, port.tool_tree)
-    _write_contacts(record, k, state)
+    line.contact_count[k] = state.contact_count[0]
+    record.used[0] = k + 1
+    _write_contacts(record, state)
     if state.impacts.logged[0] > 0:
         _write_impacts(record, step, state)
 
 
 @kernel
-def _write_contacts(record, k, state):
-    line, contacts, count, m = record.contacts, state.contacts, state.contact_count[0], record.used[0]
-    record.contact_count[k] = count
-    record.used[0] = m + count
-    for i in range(count):
+def _write_contacts(record, state):
+    line, contacts, m = record.contacts, state.contacts, record.used[1]
+    for i in range(state.contact_count[0]):
         line.body_a[m], line.body_b[m] = contacts.body_a[i], contacts.body_b[i]
         store(line.point, m, load(contacts.point, i))
         store(line.normal, m, load(contacts.normal, i))
@@ -177,13 +121,14 @@ def _write_contacts(record, k, state):
         line.normal_force[m] = contacts.normal_force[i]
         line.impulse[m], line.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
         m += 1
+    record.used[1] = m
 
 
 @kernel
 def _write_impacts(record, step, state):
     line, log = record.impacts, state.impacts
     for i in range(log.logged[0]):
-        m = record.used[1]
+        m = record.used[2]
         line.step[m], line.group[m] = step, log.group[i]
         line.rows[m], line.rank[m] = log.rows[i], log.rank[i]
         line.scale[m], line.clamp[m] = log.scale[i], log.clamp[i]
@@ -192,7 +137,7 @@ def _write_impacts(record, step, state):
         copy_into(line.v_minus[m], log.v_minus[i])
         copy_into(line.v_plus[m], log.v_plus[i])
         copy_into(line.impulse[m], log.impulse[i])
-        record.used[1] = m + 1
+        record.used[2] = m + 1
 
 
 class Recorder:
@@ -204,25 +149,34 @@ class Recorder:
 
     def __init__(self, simulation: Any) -> None:
         self.simulation = simulation
-        port, state = simulation.port, simulation.state
+        port, state, system = simulation.port, simulation.state, simulation.system
         self.start = {"q": state.q.copy(), "v": state.v.copy(),
                       "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
-        self.records: list[Any] = []
-        self._room: Room | None = None
-        self.sizes: list[int] = []
-        self.seconds: list[float] = []
+        self.coordinates = coordinates_of(simulation)  # lengths of q and v, of the scene and of the device
+        self._shape = self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
+        self._line_bytes = _line_bytes(*self._shape)
+        self.chunks: list[tuple[Any, int, float]] = []  # record, steps and seconds of each chunk held
         self.first, self.steps = 0, 0  # number of steps before those held, and number of all steps
         self._before: dict[str, float] | None = None  # the energies at `first`
-        self._at_first: Start | None = None
+        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = None  # state and energy of the whole run
+
+    @property
+    def records(self) -> list[Any]:
+        """The records of the chunks held, each once."""
+        return list({id(record): record for record, _, _ in self.chunks}.values())
 
     @property
     def held_bytes(self) -> int:
-        """Memory of the chunks held [bytes]."""
-        return sum(array.nbytes for record in self.records for array in record.arrays())
+        """Memory of the steps held [bytes]."""
+        return (self.steps - self.first) * self._line_bytes
 
     def chunk(self, total: int) -> BaseException | None:
         """Simulate and keep the next chunk; return the exception that stopped it early, if any."""
-        record, size = self._in_a_row(total)
+        size = chunk_steps(self.simulation.system.capacity, total - self.steps)
+        record = self.chunks[-1][0] if self.chunks else None
+        if record is None or len(record.steps.q) < record.used[0] + size:
+            room = int(_ROOM / max(1, self._line_bytes))
+            record = make_record(max(size, min(total - self.steps, room)), *self._shape)
         if self.steps == 0:
             self.simulation.prepare(record)  # so that only steps are timed
         started = time.perf_counter()
@@ -230,125 +184,86 @@ class Recorder:
         self.keep(record, done, time.perf_counter() - started)
         return stop
 
-    def blank(self, total: int) -> tuple[Record, int]:
+    def blank(self, total: int) -> tuple[Any, int]:
         """Return a record of its own for the next chunk, and its number of steps; the whole run has `total` steps."""
         size = chunk_steps(self.simulation.system.capacity, total - self.steps)
-        return make_record(size, *self._sizes), size
-
-    def _in_a_row(self, total: int) -> tuple[Record, int]:
-        """Return the record behind the last chunk if there is room, else in new memory, and its number of steps."""
-        size = chunk_steps(self.simulation.system.capacity, total - self.steps)
-        if self._room is None or not self._room.fits(size):
-            most = int(_ROOM / max(1, _line_bytes(*self._sizes)))
-            self._room = Room(max(size, min(total - self.steps, most)), *self._sizes)
-        return self._room.record(size), size
-
-    @property
-    def coordinates(self) -> tuple[int, int, int, int]:
-        """Lengths of q and v, of the scene and of the device."""
-        return coordinates_of(self.simulation)
-
-    @cached_property
-    def _sizes(self) -> tuple[tuple[int, int, int, int], int, int]:
-        system = self.simulation.system
-        return self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
+        return make_record(size, *self._shape), size
 
     def keep(self, record: Any, steps: int, seconds: float) -> None:
-        """Keep a chunk with `steps` written lines, which took `seconds` to simulate."""
-        if self._room is not None and not self._room.keep(record, steps):
-            self._room = None
-        self.records.append(record)
-        self.sizes.append(steps)
-        self.seconds.append(seconds)
+        """Keep a record with `steps` new lines, which took `seconds` to simulate."""
+        self.chunks.append((record, steps, seconds))
         self.steps += steps
 
     def held(self) -> list[tuple[Any, int, float]]:
-        """Return the chunks held, each as its record, steps and seconds."""
-        return list(zip(self.records, self.sizes, self.seconds, strict=True))
+        """Return the records held, each with its steps and the seconds that they took."""
+        return [(record, int(record.used[0]), sum(seconds for each, _, seconds in self.chunks if each is record))
+                for record in self.records]
 
     def forget(self) -> None:
         """Release all chunks, after the caller has stored them."""
-        self.records, self.sizes, self.seconds, self.first, self._room = [], [], [], self.steps, None
+        self.chunks, self.first = [], self.steps
 
     def go_on(self, steps: int) -> None:
         """Continue the count from a number of steps that were done and stored before."""
         self.first = self.steps = steps
 
-    def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None,
-               copied: bool = False) -> dict[str, Any]:
-        """Return the columns of `steps`, `contacts` or `impacts` over all chunks.
-
-        `before` gives a first line; `copied` gives arrays that share no memory with the chunks.
-        """
-        table, ahead = list(_LINES).index(lines), before or {}
-        if not copied and self._room is not None and self._room.chunks == len(self.records):
-            used = self._room.used[table]
-            found = {each.name: _filled(getattr(self._room.lines[lines], each.name), used) for each in _LINES[lines]}
-            return found | {name: np.concatenate([first[None], found[name]]) for name, first in ahead.items()}
-        sizes = self.sizes if lines == "steps" else [int(each.used[table - 1]) for each in self.records]
-        parts = [getattr(each, lines) for each in self.records]
+    def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None) -> dict[str, Any]:
+        """Return copies of the columns of `steps`, `contacts` or `impacts` over all records, a line `before` first."""
+        number, first = list(LINES).index(lines), before or {}
         return {each.name: np.concatenate([
-            *([ahead[each.name][None]] if each.name in ahead else []),
-            *(getattr(part, each.name)[:size] for part, size in zip(parts, sizes, strict=True))])
-            for each in _LINES[lines]}
-
-    def _counts(self) -> NDArray[np.int64]:
-        """Return the number of contacts of each step."""
-        if self._room is not None and self._room.chunks == len(self.records):
-            return self._room.counts[: self._room.used[0]]
-        return np.concatenate([each.contact_count[:size] for each, size in zip(self.records, self.sizes, strict=True)])
-
-    def run(self, world: str, stopped: str) -> Run:
-        """Return everything held as a Run; `stopped` says why it is incomplete, empty if it is complete."""
-        return self._part(world, stopped)[0]
+            *([first[each.name][None]] if each.name in first else []),
+            *(getattr(getattr(record, lines), each.name)[: record.used[number]] for record in self.records)])
+            for each in LINES[lines]}
 
     def take(self, world: str) -> Run:
         """Return and release everything held, as a part of a run; the next part starts at its end."""
-        part, ledger = self._part(world, "")
-        self._at_first = self._at_first or _first_of(part)
-        self._before = last_of(ledger(part), self._before)
+        part = self.run(world, "")
+        ledger = self._ledger(part)
+        vars(part)["energy"] = _shown(ledger, part)
+        self._at_first = self._at_first or ({name: getattr(part, name)[0].copy() for name in ("q", "v")},
+                                            {name: part.energy[name][0] for name in ("kinetic", "potential")})
+        self._before = last_of(ledger, self._before)
         self.start = {each.name: getattr(part, each.name)[-1].copy() for each in STATES}
         self.forget()
         return part
 
-    def _part(self, world: str, stopped: str) -> tuple[Run, Callable[[Run], dict[str, Floats]]]:
-        """Return the Run, and the function that computes all its energies."""
+    def run(self, world: str, stopped: str) -> Run:
+        """Return everything held as a Run; `stopped` says why it is incomplete, empty if it is complete."""
         simulation, system = self.simulation, self.simulation.system
-        more = bool(stopped)  # the run may continue, and the holder of this part may change it
-        steps = self.joined("steps", self.start, copied=more)
-        states = {each.name: steps.pop(each.name) for each in STATES}
-        counts = self._counts()
-        offsets = np.zeros(len(counts) + 1, np.int64)
-        np.cumsum(counts, out=offsets[1:])
         law, coupling, scene, mechanism = simulation.law, simulation.coupling, simulation.scene, system.mechanism
-        impacts = self.joined("impacts", copied=more)
-        struck = states["q"][impacts["step"] - self.first]
-        device = system.device_mechanism() if coupling.name != "none" else None
-        ledger = _once(partial(energy_of_run, mechanism=mechanism, gravity=system.gravity, device=device,
-                               before=self._before))
-        planar = not isinstance(scene, SpatialScene)
+        steps, impacts = self.joined("steps", self.start), self.joined("impacts")
+        offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
+        struck = steps["q"][impacts["step"] - self.first]
+        ledger, planar = self._ledger, not isinstance(scene, SpatialScene)
         later: dict[str, Any] = {
-            "scene_source": Later(lambda run: scene.source_text),
-            "scene_resolved": Later(lambda run: scene.resolved()),
-            "effects": Later(partial(_rows, simulation.effects)),
+            "scene_source": Later(lambda run: scene.source_text), "scene_resolved": Later(lambda run: scene.resolved()),
             "pose": Later(lambda run: mechanism.poses(run.q, planar=planar)),
-            "energy": Later(partial(_shown, ledger, coupling.name == "unilateral")),
+            "energy": Later(lambda run: _shown(ledger(run), run)),
             "distrust": Later(partial(_distrust, self._at_first)),
         }
-        run = Run(
+        return Run(
             scene_name=scene.name, world=world or f"{law.name} + {coupling.name}",
             law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
             coupling_settings=dict(coupling.settings), dt=system.dt, complete=not stopped,
             coordinate_names=mechanism.coordinate_names, coordinate_units=mechanism.coordinate_units,
             velocity_names=mechanism.velocity_names, velocity_units=mechanism.velocity_units,
             body_names=mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
-            time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **states, **steps,
-            contacts=ContactTable(offsets, **self.joined("contacts", copied=more)),
+            time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **steps,
+            contacts=ContactTable(offsets, **self.joined("contacts")),
             impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, struck)),
-            chunk_steps=np.array(self.sizes, np.int64), chunk_seconds=np.array(self.seconds),
+            effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores) for one in simulation.effects),
+            chunk_steps=np.array([steps for _, steps, _ in self.chunks], np.int64),
+            chunk_seconds=np.array([seconds for _, _, seconds in self.chunks], np.float64),
             kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks, **later,
         )
-        return run, ledger
+
+    @property
+    def _ledger(self) -> Any:
+        """The function that computes all energies of a run made now."""
+        system = self.simulation.system
+        device = system.device_mechanism() if self.simulation.coupling.name != "none" else None
+        return partial(energy_of_run, mechanism=system.mechanism, gravity=system.gravity, device=device,
+                       before=self._before)
 
 
 def _mass_digests(mechanism: Mechanism, places: Floats) -> NDArray[np.int64]:
@@ -358,34 +273,13 @@ def _mass_digests(mechanism: Mechanism, places: Floats) -> NDArray[np.int64]:
                                                     for k in range(0, len(places), few))])
 
 
-def _rows(effects: Sequence[Effect], run: Run) -> tuple[EffectRow, ...]:
-    return tuple(EffectRow(one.name, one.active, one.reason, one.ignores) for one in effects)
-
-
-def _once(make: Callable[[Run], dict[str, Floats]]) -> Callable[[Run], dict[str, Floats]]:
-    """Return the function with its first result cached."""
-    known: list[dict[str, Floats]] = []
-
-    def ask(run: Run) -> dict[str, Floats]:
-        if not known:
-            known.append(make(run))
-        return known[0]
-
-    return ask
-
-
-def _shown(ledger: Callable[[Run], dict[str, Floats]], carried: bool, run: Run) -> dict[str, Floats]:
+def _shown(ledger: dict[str, Floats], run: Run) -> dict[str, Floats]:
     """Return the energies to record. A unilateral coupler carries the tool at times: then leave its balance out."""
-    return {name: values for name, values in ledger(run).items() if name in _KEPT_WHEN_CARRIED or not carried}
+    carried = run.coupling == "unilateral"
+    return {name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED or not carried}
 
 
-def _first_of(run: Run) -> Start:
-    """Return state and energy at the start of a run."""
-    return ({name: getattr(run, name)[0].copy() for name in ("q", "v")},
-            {name: run.energy[name][0] for name in ("kinetic", "potential")})
-
-
-def _distrust(at_first: Start | None, part: Run) -> tuple[str, ...]:
+def _distrust(at_first: tuple[dict[str, Floats], dict[str, float]] | None, part: Run) -> tuple[str, ...]:
     """Return the distrust of a run; of a later part, as if its first state were that of the whole run."""
     if at_first is None:
         return distrust_of(part)
@@ -393,8 +287,3 @@ def _distrust(at_first: Start | None, part: Run) -> tuple[str, ...]:
         name: np.concatenate([state[None], getattr(part, name)[1:]]) for name, state in at_first[0].items()}
     ledger = {name: np.concatenate([[value], part.energy[name][1:]]) for name, value in at_first[1].items()}
     return distrust_of(replace(part, energy=part.energy | ledger, distrust=(), **states))
-
-
-def _filled(array: np.ndarray, used: int) -> np.ndarray:
-    """Return the first lines of an array; if most of it is unused, as a copy, which does not keep the array alive."""
-    return array[:used] if 2 * used >= len(array) else array[:used].copy()

@@ -9,26 +9,21 @@ the tool in the hand (and of the device, which has the same kinematics).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from hashlib import blake2b
 from html import escape
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.lazy import extension, needed
+from iapb.schema import Booleans, Floats, Integers, Quantity, States, along, quantities
 
 FREE, COLLIDING, RESTING = 0, 1, 2  # contact states of the paper, section III
 STATE_NAMES = ("free", "colliding", "resting")
 _SHOWN = 12  # most coordinates that a plot or a table shows
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Booleans = NDArray[np.bool_]
-States = NDArray[np.int8]
-_TYPES = {"Floats": np.float64, "Integers": np.int64, "Booleans": np.bool_, "States": np.int8}
 
 # Units of generalized quantities follow the unit of their coordinate or of their velocity.
 POSITION = {"m": "m", "rad": "rad", "1": "1"}
@@ -39,55 +34,21 @@ IMPULSE = {"m/s": "N s", "rad/s": "N m s", "1": "1"}
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """A recorded array: its name (also the attribute of the record), type, dimensions, unit and meaning.
-
-    For a generalized quantity, `unit` maps the unit of each coordinate (or of each velocity) to the unit of the
-    quantity.
-    """
-
-    name: str
-    dtype: type
-    dimensions: tuple[str, ...]
-    unit: str | dict[str, str]
-    meaning: str
-
-
-def _along(dimensions: str, unit: str | dict[str, str], meaning: str) -> dict[str, Any]:
-    """Return the metadata of a recorded field."""
-    return {"dimensions": tuple(dimensions.split()), "unit": unit, "meaning": meaning}
-
-
-def quantities(record: type, first: str = "") -> tuple[Quantity, ...]:
-    """Return the recorded arrays of a record class in order; if `first` is given, only those along this dimension."""
-    found = (Quantity(f.name, _TYPES[str(f.type)], **f.metadata) for f in fields(record) if f.metadata)
-    return tuple(quantity for quantity in found if first in ("", quantity.dimensions[0]))
-
-
-def blank(listed: Iterable[Quantity], lengths: Mapping[str, int],
-          make: Callable[..., NDArray[Any]] = np.zeros) -> dict[str, NDArray[Any]]:
-    """Return one array per quantity, by name, made by `make`; `lengths` gives the length of each dimension."""
-    return {each.name: make([lengths[name] for name in each.dimensions], each.dtype) for each in listed}
-
-
-@dataclass(frozen=True)
 class ContactTable:
     """Contacts of all steps. The rows ``offsets[k]:offsets[k + 1]`` are the contacts of step k."""
 
-    offsets: Integers = field(metadata=_along(
-        "step_edge", "1", "first row of each step's contacts; the last entry closes"))
-    body_a: Integers = field(metadata=_along("contact", "1", "moving body that the normal points into"))
-    body_b: Integers = field(metadata=_along("contact", "1", "other body, -1 = the static world"))
-    point: Floats = field(metadata=_along("contact axis", "m", "contact point, world axes"))
-    normal: Floats = field(metadata=_along("contact axis", "1", "unit normal, from b into a"))
-    gap: Floats = field(metadata=_along("contact", "m", "distance, negative = overlap"))
-    normal_velocity: Floats = field(metadata=_along(
-        "contact", "m/s", "before the step's impulse, positive separates"))
-    normal_force: Floats = field(metadata=_along("contact", "N", "force on a along the normal"))
-    friction_force: Floats = field(metadata=_along("contact axis", "N", "friction force on a"))
-    impulse: Floats = field(metadata=_along(  # the one of least norm if it is not unique
-        "contact", "N s", "collision impulse on a along the normal"))
-    is_new: Booleans = field(metadata=_along("contact", "1", "1 where the contact was not there in the step before"))
+    offsets: Annotated[Integers, along("step_edge", "1", "first row of each step's contacts; the last entry closes")]
+    body_a: Annotated[Integers, along("contact", "1", "moving body that the normal points into")]
+    body_b: Annotated[Integers, along("contact", "1", "other body, -1 = the static world")]
+    point: Annotated[Floats, along("contact axis", "m", "contact point, world axes")]
+    normal: Annotated[Floats, along("contact axis", "1", "unit normal, from b into a")]
+    gap: Annotated[Floats, along("contact", "m", "distance, negative = overlap")]
+    normal_velocity: Annotated[Floats, along("contact", "m/s", "before the step's impulse, positive separates")]
+    normal_force: Annotated[Floats, along("contact", "N", "force on a along the normal")]
+    friction_force: Annotated[Floats, along("contact axis", "N", "friction force on a")]
+    # the one of least norm if it is not unique
+    impulse: Annotated[Floats, along("contact", "N s", "collision impulse on a along the normal")]
+    is_new: Annotated[Booleans, along("contact", "1", "1 where the contact was not there in the step before")]
 
 
 @dataclass(frozen=True)
@@ -97,24 +58,23 @@ class ImpactTable:
     An island is a set of trees connected by contacts of the collision. A tree that merely touches them is not in it.
     """
 
-    step: Integers = field(metadata=_along("impact", "1", "step in which it happened"))
-    group: Integers = field(metadata=_along("impact", "1", "first tree of those resolved together"))
-    v_minus: Floats = field(metadata=_along("impact velocity", VELOCITY, "generalized velocity before"))
-    v_plus: Floats = field(metadata=_along("impact velocity", VELOCITY, "generalized velocity after"))
-    impulse: Floats = field(metadata=_along("impact velocity", IMPULSE, "generalized impulse"))
-    rows: Integers = field(metadata=_along("impact", "1", "rows given to the resolver"))
-    rank: Integers = field(metadata=_along("impact", "1", "rows it found independent and used"))
-    energy_lost: Floats = field(metadata=_along("impact", "J", "kinetic energy before minus after"))
-    scale: Floats = field(metadata=_along("impact", "1", "factor by which the device limit scaled the impulse"))
-    clamp: Floats = field(metadata=_along("impact", "1", "factor of the final energy clamp"))
-    friction_share: Floats = field(metadata=_along(
-        "impact", "1", "factor by which friction was reduced (energy, cones)"))
-    approaching: Integers = field(metadata=_along(
-        "impact", "1", "rows that approach still afterwards, -1 = the law does not say"))
-    solved: Booleans = field(metadata=_along(
-        "impact", "1", "0 where the law is not met (friction reduced); passive all the same"))
-    mass_digest: Integers = field(metadata=_along(
-        "impact", "1", "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer"))
+    step: Annotated[Integers, along("impact", "1", "step in which it happened")]
+    group: Annotated[Integers, along("impact", "1", "first tree of those resolved together")]
+    v_minus: Annotated[Floats, along("impact velocity", VELOCITY, "generalized velocity before")]
+    v_plus: Annotated[Floats, along("impact velocity", VELOCITY, "generalized velocity after")]
+    impulse: Annotated[Floats, along("impact velocity", IMPULSE, "generalized impulse")]
+    rows: Annotated[Integers, along("impact", "1", "rows given to the resolver")]
+    rank: Annotated[Integers, along("impact", "1", "rows it found independent and used")]
+    energy_lost: Annotated[Floats, along("impact", "J", "kinetic energy before minus after")]
+    scale: Annotated[Floats, along("impact", "1", "factor by which the device limit scaled the impulse")]
+    clamp: Annotated[Floats, along("impact", "1", "factor of the final energy clamp")]
+    friction_share: Annotated[Floats, along("impact", "1", "factor by which friction was reduced (energy, cones)")]
+    approaching: Annotated[Integers, along(
+        "impact", "1", "rows that approach still afterwards, -1 = the law does not say")]
+    solved: Annotated[Booleans, along(
+        "impact", "1", "0 where the law is not met (friction reduced); passive all the same")]
+    mass_digest: Annotated[Integers, along(
+        "impact", "1", "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer")]
 
 
 def digests(matrices: Floats) -> Integers:
@@ -138,9 +98,6 @@ class Later(NamedTuple):
     """A function of the run that computes an attribute at its first use."""
 
     value: Callable[[Run], Any]
-
-
-_LATER = ("scene_source", "scene_resolved", "pose", "energy", "effects", "distrust")
 
 
 @dataclass(frozen=True, repr=False)
@@ -169,51 +126,49 @@ class Run:
     tool_coordinates: tuple[int, int]  # start, stop of the tool in q: a quaternion has more entries than its velocity
 
     time: Floats  # (n + 1,) [s]
-    q: Floats = field(metadata=_along("time coordinate", POSITION, "generalized configuration"))
-    v: Floats = field(metadata=_along("time velocity", VELOCITY, "generalized velocity"))
-    device_q: Floats = field(metadata=_along("time device_coordinate", POSITION, "configuration of the device"))
-    device_v: Floats = field(metadata=_along("time device_velocity", VELOCITY, "velocity of the device"))
+    q: Annotated[Floats, along("time coordinate", POSITION, "generalized configuration")]
+    v: Annotated[Floats, along("time velocity", VELOCITY, "generalized velocity")]
+    device_q: Annotated[Floats, along("time device_coordinate", POSITION, "configuration of the device")]
+    device_v: Annotated[Floats, along("time device_velocity", VELOCITY, "velocity of the device")]
     # of each body's frame: x, y, angle in (−π, π] in the plane; x, y, z and a quaternion x, y, z, w >= 0 in space
-    pose: Floats = field(metadata=_along("time body placement", POSITION, "where each body is"))
+    pose: Annotated[Floats, along("time body placement", POSITION, "where each body is")]
 
-    hand_force: Floats = field(metadata=_along("step velocity", FORCE, "generalized force of the hand on the tool"))
-    coupling_force: Floats = field(metadata=_along("step velocity", FORCE, "force of the coupling on the tool"))
-    penalty_force: Floats = field(metadata=_along(
-        "step velocity", FORCE, "normal contact forces, or constraint forces"))
-    friction_force: Floats = field(metadata=_along("step velocity", FORCE, "friction forces"))
-    impulse: Floats = field(metadata=_along("step velocity", IMPULSE, "generalized collision impulse of the step"))
-    environment_force: Floats = field(metadata=_along("step velocity", FORCE, "contact forces + impulse / dt (26)"))
-    device_force: Floats = field(metadata=_along("step device_velocity", FORCE, "what the device's actuators apply"))
-    state: States = field(metadata=_along("step", "1", "contact state of the tool's group"))
+    hand_force: Annotated[Floats, along("step velocity", FORCE, "generalized force of the hand on the tool")]
+    coupling_force: Annotated[Floats, along("step velocity", FORCE, "force of the coupling on the tool")]
+    penalty_force: Annotated[Floats, along("step velocity", FORCE, "normal contact forces, or constraint forces")]
+    friction_force: Annotated[Floats, along("step velocity", FORCE, "friction forces")]
+    impulse: Annotated[Floats, along("step velocity", IMPULSE, "generalized collision impulse of the step")]
+    environment_force: Annotated[Floats, along("step velocity", FORCE, "contact forces + impulse / dt (26)")]
+    device_force: Annotated[Floats, along("step device_velocity", FORCE, "what the device's actuators apply")]
+    state: Annotated[States, along("step", "1", "contact state of the tool's group")]
     contacts: ContactTable
     impacts: ImpactTable
     energy: dict[str, Floats]  # the ledger, see iapb.mechanics.energy
     effects: tuple[EffectRow, ...]
 
-    chunk_steps: Integers = field(
-        default_factory=lambda: np.zeros(0, np.int64), metadata=_along("chunk", "1", "steps per timed chunk"))
-    chunk_seconds: Floats = field(
-        default_factory=lambda: np.zeros(0), metadata=_along("chunk", "s", "wall time of each chunk"))
+    chunk_steps: Annotated[Integers, along("chunk", "1", "steps per timed chunk")] = field(
+        default_factory=lambda: np.zeros(0, np.int64))
+    chunk_seconds: Annotated[Floats, along("chunk", "s", "wall time of each chunk")] = field(
+        default_factory=lambda: np.zeros(0))
     kernel: str = "compiled"  # or "python"
     stopped: str = ""  # why an incomplete run was stopped; empty for a complete one
     remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene, such as by contact.auto
     # why the result is not to be trusted (`iapb.advice.distrust`); empty if nothing is wrong
-    distrust: tuple[str, ...] = field(default_factory=tuple)
+    distrust: tuple[str, ...] = field(default_factory=tuple)  # no default of the class, which would hide a Later
 
     def __post_init__(self) -> None:
         """Set the attributes aside that are computed at first use."""
-        self.__dict__["_later"] = {name: self.__dict__.pop(name).value for name in _LATER
-                                   if isinstance(self.__dict__[name], Later)}
+        later = {name: value for name, value in vars(self).items() if isinstance(value, Later)}
+        for name in later:
+            del vars(self)[name]
+        vars(self)["_later"] = later
 
     def __getattr__(self, name: str) -> Any:
         """Compute an attribute at its first use."""
-        later = self.__dict__.get("_later", {}).get(name)
-        if later is None and name not in self.__dict__:  # another thread may have been quicker
+        later = vars(self).get("_later", {}).get(name)
+        if later is None:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        if later is not None:
-            self.__dict__.setdefault(name, later(self))
-            self._later.pop(name, None)
-        return self.__dict__[name]
+        return vars(self).setdefault(name, later.value(self))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all attributes, computed, for pickle and copies."""
@@ -275,11 +230,8 @@ class Run:
         for name in ("kinetic", "potential"):
             if name in self.energy:
                 energy.plot(self.time, self.energy[name], label=name)
-        offsets = self.contacts.offsets
         deepest = np.zeros(self.steps)
-        touching = np.flatnonzero(np.diff(offsets))
-        if len(touching):
-            deepest[touching] = np.maximum(-np.minimum.reduceat(self.contacts.gap, offsets[touching]), 0.0)
+        np.maximum.at(deepest, np.repeat(np.arange(self.steps), np.diff(self.contacts.offsets)), -self.contacts.gap)
         depth.plot(self.time[:-1], 1e3 * deepest, label="deepest contact")
         for axes, label in ((places, "coordinates"), (energy, "energy [J]"), (depth, "penetration [mm]")):
             axes.set_ylabel(label)
@@ -324,7 +276,7 @@ def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] 
     """Return the values along a dimension and their unit: labels, instants, or 0, 1, 2 …"""
     if dimension == "time":
         return np.asarray(run.time, np.float64), "s"
-    labels = ("x", "y", "z") if dimension == "axis" else _labels_along(run, dimension)[0]
+    labels, _ = _labels_along(run, dimension)
     if labels and len(labels) == length:
         return labels, "1"
     return np.arange(length, dtype=np.int64), "1"
@@ -340,6 +292,7 @@ def _labels_along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str,
         "device_coordinate": (run.coordinate_names[q], run.coordinate_units[q]),
         "device_velocity": (run.velocity_names[v], run.velocity_units[v]),
         "body": (run.body_names, ()),
+        "axis": (("x", "y", "z"), ()),
         "placement": (("x", "y", "angle") if planar else ("x", "y", "z", "qx", "qy", "qz", "qw"),
                       ("m", "m", "rad") if planar else ("m", "m", "m", "1", "1", "1", "1")),
     }.get(dimension, ((), ()))

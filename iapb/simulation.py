@@ -13,15 +13,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
-from numbers import Real
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.compiled import Entry, copy_into, kernel
 from iapb.compiling import compiling_told, to_stderr
@@ -32,7 +32,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
 from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device, render
-from iapb.recording import Record, Recorder, bytes_per_step, write_step
+from iapb.recording import Recorder, bytes_per_step, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.system import System, system_of, wrenches_of
@@ -44,10 +44,9 @@ FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range
 
 
 @kernel
-def compiled_steps(  # type: ignore[no-untyped-def]
-    world, state, port, record, first, steps
-):
+def compiled_steps(world, state, port, record, first, steps):  # type: ignore[no-untyped-def]
     """Do `steps` steps of an engine law; return the number of steps done and the status."""
+    line = record.used[0]
     for k in range(steps):
         if port.planned.shape[0] > 0:
             copy_into(port.wrench, port.planned[k])
@@ -57,65 +56,9 @@ def compiled_steps(  # type: ignore[no-untyped-def]
             return k, status
         if not drive_device(world, state, port):
             return k, DEVICE_NOT_FINITE
-        write_step(record, k, first + k, state, port)
+        write_step(record, line + k, first + k, state, port)
     return steps, 0
 
-
-class Stepper:
-    """The parts of a step of one simulation, called without numba's look-up of types (about 10 µs a call).
-
-    Parameters
-    ----------
-    world, state, port : the simulation's blocks, which must not be replaced.
-    link : link to an external device; None for the compiled device.
-    """
-
-    def __init__(self, world: Any, state: Any, port: Any, link: DeviceLink | None) -> None:
-        self._blocks, self._link = (world, state, port), link
-        self._couple: Any = Entry(couple)
-        self._advance: Any = Entry(advance)
-        self._render: Any = Entry(render)
-        self._move: Any = Entry(move_device)
-        self._write: Any = Entry(write_step)
-
-    def prepare(self, record: Record) -> None:
-        """Find the machine code of every part before the first step; this takes milliseconds."""
-        world, state, port = blocks = self._blocks
-        self._couple = Entry(couple).taking(*blocks)
-        self._advance = Entry(advance).taking(world, state, port.applied)
-        self._render, self._move = Entry(render).taking(*blocks), Entry(move_device).taking(*blocks)
-        self._write = Entry(write_step).taking(record, 0, 0, state, port)
-
-    def couple(self) -> None:
-        """Write the forces of hand and coupling on the tool into ``port.applied``."""
-        self._couple(*self._blocks)
-
-    def advance(self) -> None:
-        """Advance an engine law by one step; raise IapbError if the step fails."""
-        world, state, port = self._blocks
-        status = self._advance(world, state, port.applied)
-        if status:
-            raise IapbError(FAILURES[status])
-
-    def render(self) -> None:
-        """Compute the force that the device renders (26), and send it to an external device."""
-        self._render(*self._blocks)
-        if self._link is not None:
-            self._link.send()
-
-    def finish(self) -> None:
-        """Move the compiled device, or read the external one."""
-        if self._link is not None:
-            self._link.receive()
-        elif self._blocks[2].coupling != NO_COUPLING and not self._move(*self._blocks):
-            raise IapbError(FAILURES[DEVICE_NOT_FINITE])
-
-    def write(self, record: Record, k: int, step: int) -> None:
-        """Copy step number `step` into line k of the chunk."""
-        self._write(record, k, step, *self._blocks[1:])
-
-
-Floats = NDArray[np.float64]
 
 _STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
@@ -153,7 +96,10 @@ class Simulation:
 
     def __init__(self, scene: Scene | System | str | Path, law: ContactLaw | None = None,
                  coupling: Coupling | None = None, device: Device | None = None) -> None:
-        self.law: Any = ImpulseAugmented() if law is None else _checked_law(law)
+        self.law: Any = ImpulseAugmented() if law is None else law
+        if isinstance(law, type) or not all(hasattr(self.law, name) for name in ("name", "settings", "advance")):
+            raise ArgumentError("law", law, "a contact law: an object with name, settings and advance(...); "
+                                            "the name of a world is given as world=...")  # fmt: skip
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
         if not isinstance(self.coupling, Coupling):
             raise ArgumentError("coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)")
@@ -167,21 +113,21 @@ class Simulation:
         self.effects = self.system.decide(self.law, self.coupling)
         self.world = self.system.world_under(*(self.law, self.effects) if self.compiled else (Penalty(),))
         self.port = self.system.make_port(self.coupling, self.effects, external=device is not None)
-        blocks = (self.world, self.state, self.port)
-        self.link = None if device is None else DeviceLink(device, *blocks)
-        self.stepper = Stepper(*blocks, self.link)
-        self._steps = Entry(compiled_steps)
+        self.link = None if device is None else DeviceLink(device, self.world, self.state, self.port)
+        self._couple, self._advance, self._render = Entry(couple), Entry(advance), Entry(render)
+        self._move, self._write, self._steps = Entry(move_device), Entry(write_step), Entry(compiled_steps)
         self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
 
     def arrays(self) -> list[np.ndarray]:
         """Return all arrays that a step may change, in a fixed order; a simulation resumes from copies of them."""
-        return [*self.state.arrays(), *self.port.arrays()]  # type: ignore[attr-defined]
+        return [*self.state.arrays(), *self.port.arrays()]
 
     @property
     def keeps_no_state(self) -> bool:
         """Whether the next step depends on `arrays` alone: no external device, and no law with a state of its own."""
-        return self.link is None and (self.compiled or _is_frozen(self.law))
+        frozen = getattr(getattr(self.law, "__dataclass_params__", None), "frozen", False)
+        return self.link is None and (self.compiled or bool(frozen))
 
     @property
     def time(self) -> float:
@@ -211,19 +157,31 @@ class Simulation:
 
     def begin_step(self) -> None:
         """Do the first half of a step: apply hand and coupling, advance the law, send the device its force."""
+        world, state, port = self.world, self.state, self.port
         if self._planned:
-            self.port.wrench[:] = wrenches_of(self.scene, [self.time])[0]
-        self.stepper.couple()
+            port.wrench[:] = wrenches_of(self.scene, [self.time])[0]
+        self._couple(world, state, port)
         if self.compiled:
-            self.stepper.advance()
+            status = self._advance(world, state, port.applied)
+            if status:
+                raise IapbError(FAILURES[status])
         else:
-            self._take(self.law.advance(self.system, self.state, self.port.applied, self.system.dt))
-        self.stepper.render()
+            self._take(self.law.advance(self.system, state, port.applied, self.system.dt))
+        self._render(world, state, port)
+        if self.link is not None:
+            self.link.send()
 
     def end_step(self) -> None:
         """Do the second half of a step: move the device or read it."""
-        self.stepper.finish()
+        if self.link is not None:
+            self.link.receive()
+        elif self.port.coupling != NO_COUPLING and not self._move(self.world, self.state, self.port):
+            raise IapbError(FAILURES[DEVICE_NOT_FINITE])
         self.steps_done += 1
+
+    def write(self, record: Any, line: int) -> None:
+        """Write the last step to a line of a record."""
+        self._write(record, line, self.steps_done - 1, self.state, self.port)
 
     def _grip(self, hand_force: ArrayLike) -> None:
         if self.system.tool_tree < 0:
@@ -250,31 +208,31 @@ class Simulation:
             if not 0 <= count <= most:
                 state.contact_count[0] = logged[0] = 0
                 raise ArgumentError(f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer")
-        for name in _STEP_VECTORS:
-            target, values = getattr(state, name), np.asarray(getattr(result, name))
+        vectors = {name: np.asarray(getattr(result, name)) for name in _STEP_VECTORS}
+        for name, values in vectors.items():
+            target = getattr(state, name)
             if values.shape != target.shape or not np.all(np.isfinite(values)):
                 raise ArgumentError(f"{law} {name}", values, f"{len(target)} finite numbers")
-        for name in _STEP_VECTORS:
-            getattr(state, name)[:] = getattr(result, name)
-        if self.system.tool_tree >= 0:
-            state.state_of_tree[self.system.tool_tree] = result.state
-        else:
-            state.state_of_tree[:] = result.state
+        for name, values in vectors.items():
+            getattr(state, name)[:] = values
+        tool = self.system.tool_tree
+        state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 
-    def prepare(self, record: Record) -> None:
-        """Load or compile the machine code of a step, which can take minutes, before the first step is timed.
+    def prepare(self, record: Any, *, singly: bool = False) -> None:
+        """Load or compile the machine code of chunks, or of steps called `singly`, before the first step is timed."""
+        world, state, port = blocks = self.world, self.state, self.port
+        if self.compiled and self.link is None and not singly:
+            self._steps(*blocks, record, self.steps_done, 0)
+            return
+        self._couple.taking(*blocks)
+        self._render.taking(*blocks)
+        self._write.taking(record, 0, 0, state, port)
+        if self.compiled:
+            self._advance.taking(world, state, port.applied)
+        if self.link is None and port.coupling != NO_COUPLING:
+            self._move.taking(*blocks)
 
-        A law in Python does so in a first step, which is then undone. A law that may have its own state is skipped.
-        """
-        if self.compiled and self.link is None:
-            self._steps(self.world, self.state, self.port, record, self.steps_done, 0)
-        elif self.link is None and _is_frozen(self.law):
-            with _undone(self.state, self.port), suppress(IapbError):  # the first step will say so
-                self.step()
-                self.stepper.write(record, 0, 0)
-            self.steps_done, record.used[:] = 0, 0
-
-    def advance_chunk(self, record: Record, steps: int) -> tuple[int, BaseException | None]:
+    def advance_chunk(self, record: Any, steps: int) -> tuple[int, BaseException | None]:
         """Do and record up to `steps` steps; return the number done, and the exception that stopped them or None."""
         if self.compiled and self.link is None:
             planned, stop = self._plan(steps)
@@ -286,9 +244,8 @@ class Simulation:
                 self.step()
             except (IapbError, KeyboardInterrupt) as stop:
                 return k, stop
-            self.stepper.write(record, k, self.steps_done - 1)
+            self.write(record, int(record.used[0]))
         return steps, None
-
 
     def _plan(self, steps: int) -> tuple[int, IapbError | None]:
         """Give the compiled loop the hand's force of each step; return the number of valid steps and the error."""
@@ -299,29 +256,6 @@ class Simulation:
             except IapbError as stop:
                 return k, stop
         return steps, None
-
-
-@contextmanager
-def _undone(*blocks: Any) -> Iterator[None]:
-    """Restore the arrays of the blocks at the end."""
-    kept = [(array, array.copy()) for part in blocks for array in part.arrays()]
-    try:
-        yield
-    finally:
-        for array, before in kept:
-            array[...] = before
-
-
-def _checked_law(law: Any) -> Any:
-    if isinstance(law, type) or not all(hasattr(law, name) for name in ("name", "settings", "advance")):
-        raise ArgumentError("law", law, "a contact law: an object with name, settings and advance(...); "
-                                        "the name of a world is given as world=...")  # fmt: skip
-    return law
-
-
-def _is_frozen(law: Any) -> bool:
-    settings = getattr(law, "__dataclass_params__", None)
-    return settings is not None and bool(settings.frozen)
 
 
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
@@ -354,50 +288,51 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     IapbError, KeyboardInterrupt
         The run stopped before its first step was done, so there is nothing to return.
     """
+    for name, value, fine, expected in (
+        ("world", world, isinstance(world, str), "the name of a world, as text"),
+        ("steps", steps, steps is None or _is_positive(steps, Integral), "a whole number >= 1"),
+        ("progress", progress, progress is None or callable(progress), "a function of the steps done and the total"),
+        ("checkpoint", checkpoint, checkpoint is None or (callable(checkpoint) and hasattr(checkpoint, "due")),
+         "a function of the run, with an attribute `due`"),
+        ("max_memory", max_memory, max_memory is None or _is_positive(max_memory, Real),
+         "a number of bytes > 0; math.inf for no limit"),
+    ):
+        if not fine:
+            raise ArgumentError(name, value, expected)
     if not isinstance(scene, Scene):
         scene = _scene_at(find_scene(scene))
-    if not isinstance(world, str):
-        raise ArgumentError("world", world, "the name of a world, as text")
-    if progress is not None and not callable(progress):
-        raise ArgumentError("progress", progress, "a function of the steps done and the total steps")
-    if checkpoint is not None and not (callable(checkpoint) and hasattr(checkpoint, "due")):
-        raise ArgumentError("checkpoint", checkpoint, "a function of the run, with an attribute `due`")
-    most = _half_of_memory() if max_memory is None else _byte_count(max_memory)
     if world and law is None:
         chosen = find_world(world)
         law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
     simulation = Simulation(system_of(scene), law, coupling)
-    total = simulation.scene.steps if steps is None else _step_count(steps)
-    _fits(simulation, total, most)
+    total = simulation.scene.steps if steps is None else int(steps)
+    _check_memory(simulation, total, max_memory)
+    recorder = Recorder(simulation)
+
+    def keep() -> None:
+        if checkpoint is not None and checkpoint.due:
+            checkpoint(recorder.run(world, "not finished when this was written"))
+
     with compiling_told(to_stderr):
-        return _simulated(simulation, world, total, progress, checkpoint)
+        stopped = record(recorder, total, progress, keep)
+        return recorder.run(world, stopped)
+
+
+def _is_positive(value: Any, kind: Any) -> bool:
+    return isinstance(value, kind) and not isinstance(value, bool) and bool(value > 0)
 
 
 def _scene_at(path: Path) -> Scene:
     """Return the scene of a file, cached by its text; a scene with a robot is read again, for its URDF may change."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, ValueError):
-        return load_scene(path)  # this raises the right error
-    return load_scene(path) if "urdf" in text else _scene_of(path, text)
+    text = b"urdf"  # of a file that cannot be read: `load_scene` raises the right error
+    with suppress(OSError):
+        text = path.read_bytes()
+    return load_scene(path) if b"urdf" in text else _scene_of(path, text)
 
 
 @lru_cache(maxsize=8)
-def _scene_of(path: Path, text: str) -> Scene:
+def _scene_of(path: Path, text: bytes) -> Scene:
     return load_scene(path)
-
-
-def _simulated(simulation: Simulation, world: str, total: int, progress: Callable[[int, int], None] | None,
-               checkpoint: Checkpoint | None) -> Run:
-    """Run the loop of `simulate`, chunk by chunk."""
-    recording = Recorder(simulation)
-
-    def keep() -> None:
-        if checkpoint is not None and checkpoint.due:
-            checkpoint(recording.run(world, "not finished when this was written"))
-
-    stopped = record(recording, total, progress, keep)
-    return recording.run(world, stopped)
 
 
 def record(recording: Recorder, total: int, progress: Callable[[int, int], None] | None = None,
@@ -427,20 +362,12 @@ def record(recording: Recorder, total: int, progress: Callable[[int, int], None]
     return "" if recording.steps == total else why
 
 
-def _step_count(steps: Any) -> int:
-    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
-        raise ArgumentError("steps", steps, "a whole number >= 1")
-    return int(steps)
-
-
-def _byte_count(most: Any) -> float:
-    if isinstance(most, bool) or not isinstance(most, Real) or not float(most) > 0.0:
-        raise ArgumentError("max_memory", most, "a number of bytes > 0; math.inf for no limit")
-    return float(most)
-
-
-def _fits(simulation: Simulation, steps: int, most: float) -> None:
-    """Raise an ArgumentError if the record would take more than `most` bytes."""
+def _check_memory(simulation: Simulation, steps: int, most: float | None) -> None:
+    """Raise an ArgumentError if the record takes more than `most` bytes; default: half of the machine's memory."""
+    if most is None:
+        most = 4e9  # if the system does not report it
+        with suppress(AttributeError, ValueError, OSError):
+            most = 0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     each = bytes_per_step(simulation)
     if steps * each > most:
         raise ArgumentError("steps", steps, f"at most {int(most / each):,}: the record takes {each} bytes a step and "
@@ -451,11 +378,3 @@ def _fits(simulation: Simulation, steps: int, most: float) -> None:
 def _bytes(count: float) -> str:
     power = min(int(math.log10(max(count, 1.0)) // 3), 6)
     return f"{count / 1e3**power:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB', 'PB', 'EB')[power]}"
-
-
-def _half_of_memory() -> float:
-    """Return half of the machine's memory [bytes], or 4 GB if the system does not report it."""
-    try:
-        return 0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return 4e9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
@@ -28,16 +28,15 @@ class World(NamedTuple):
         return coupling_of(scene, "none" if without else self.coupling)
 
 
+def _augmented(name: str, **settings: Any) -> Callable[[str], World]:
+    return lambda rendering: World(name, ImpulseAugmented(rendering=rendering, **settings), "four-channel")
+
+
 # name -> function of the rendering (how IAPB respects the device's limits) that returns the world
 WORLDS: dict[str, Callable[[str], World]] = {
-    "IAPB": lambda rendering: World("IAPB", ImpulseAugmented(rendering=rendering), "four-channel"),
-    "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
-    "IAPB-friction": lambda rendering: World(
-        "IAPB-friction", ImpulseAugmented(rendering=rendering, friction_in_impacts=True), "four-channel"
-    ),
-    "IAPB-push": lambda rendering: World(
-        "IAPB-push", ImpulseAugmented(rendering=rendering, pushing=True), "four-channel"
-    ),
+    "IAPB": _augmented("IAPB"), "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
+    "IAPB-friction": _augmented("IAPB-friction", friction_in_impacts=True),
+    "IAPB-push": _augmented("IAPB-push", pushing=True),
 }
 
 

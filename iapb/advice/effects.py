@@ -1,6 +1,6 @@
 """Decide which effects a scene needs, and why: those of the paper's (1)-(26) that the scene needs, and no others.
 
-The decision is made once, here. `iapb.system.make_world` and `make_port` set the engine's switches from it, every run
+The decision is made once, here. `iapb.system.System` sets the switches of the engine from it, every run
 records it, and `iapb effects` prints it. An effect is a row of `EFFECTS`; to add one, add a row.
 """
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from iapb.errors import ArgumentError
 
@@ -22,13 +22,8 @@ from iapb.errors import ArgumentError
 class NoCoupling:
     """The hand holds the tool directly; there is no device."""
 
-    name = "none"
-    kind = 0
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """No settings."""
-        return {}
+    name, kind = "none", 0
+    settings: ClassVar[dict[str, Any]] = {}
 
 
 @dataclass(frozen=True)
@@ -53,15 +48,13 @@ class _PositionCoupling:
 class FourChannel(_PositionCoupling):
     """Four-channel controller: two position channels (PD), two force channels (F_h, F_env)."""
 
-    name = "four-channel"
-    kind = 1
+    name, kind = "four-channel", 1
 
 
 class UnilateralCoupler(_PositionCoupling):
     """PD between device and tool while the tool is in contact; apart from it only the hand acts on the device."""
 
-    name = "unilateral"
-    kind = 2
+    name, kind = "unilateral", 2
 
 
 Coupling = NoCoupling | FourChannel | UnilateralCoupler

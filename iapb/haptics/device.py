@@ -11,15 +11,14 @@ from collections import deque
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.compiled import Entry
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.kernels import NO_COUPLING, UNILATERAL, engage, observe_work
 from iapb.linalg import cholesky, solve_mass
 from iapb.mechanics.bodies import finite_array
-
-Floats = NDArray[np.float64]
+from iapb.schema import Floats
 
 
 class DeviceReading(NamedTuple):
@@ -84,10 +83,13 @@ class SimulatedDevice:
     ) -> None:
         mass = np.array(mass_matrix, np.float64)
         size = len(mass) if mass.ndim else 0
+        self._lower = np.zeros_like(mass)
+        symmetric = mass.shape == (size, size) and np.all(np.isfinite(mass)) and np.array_equal(mass, mass.T)
+        if not symmetric or cholesky(mass, self._lower) != 0:
+            raise ArgumentError("mass_matrix", mass_matrix, "a finite symmetric positive definite matrix (d, d)")
         self.q = finite_array("q", q, (size,))
         self.v = np.zeros(size) if v is None else finite_array("v", v, (size,))
         self.hand_force = np.zeros(size)
-        self._lower = _cholesky(mass)
         if not (np.isfinite(dt) and dt > 0.0):
             raise ArgumentError("dt", dt, "a step length > 0")
         if delay < 0:
@@ -122,18 +124,6 @@ class SimulatedDevice:
         return np.where(step > 0.0, np.round(self.q / np.where(step > 0.0, step, 1.0)) * step, self.q)
 
 
-def _cholesky(mass_matrix: Floats) -> Floats:
-    """Return the lower Cholesky factor of a mass matrix; an ArgumentError names the matrix."""
-    expected = "a finite symmetric positive definite matrix (d, d)"
-    square = mass_matrix.ndim == 2 and mass_matrix.shape[0] == mass_matrix.shape[1]
-    if not square or not np.all(np.isfinite(mass_matrix)) or not np.array_equal(mass_matrix, mass_matrix.T):
-        raise ArgumentError("mass_matrix", mass_matrix, expected)
-    lower = np.zeros_like(mass_matrix)
-    if cholesky(mass_matrix, lower) != 0:
-        raise ArgumentError("mass_matrix", mass_matrix, expected)
-    return lower
-
-
 def _per_coordinate(name: str, values: ArrayLike | None, size: int, default: float) -> Floats:
     if values is None:
         return np.full(size, default)
@@ -141,9 +131,6 @@ def _per_coordinate(name: str, values: ArrayLike | None, size: int, default: flo
     if vector.shape != (size,) or not np.all(vector >= 0.0):
         raise ArgumentError(name, values, f"{size} numbers >= 0")
     return vector
-
-
-# A device in place of the compiled one: its readings are checked, its force is sent to it.
 
 
 class DeviceLink:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Annotated, Any, NamedTuple
 
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.narrow_phase import detect
@@ -16,13 +14,14 @@ from iapb.mechanics.kernels.dynamics import bias, mass_matrix
 from iapb.mechanics.kernels.free_motion import RIGID, FreeMotion, move_simple_trees
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 from iapb.run import FREE
+from iapb.schema import Booleans, Floats, Integers
 
 NO_COUPLING, FOUR_CHANNEL, UNILATERAL = 0, 1, 2
 PLANNED = 512  # steps for which a time-varying hand force is planned ahead; no chunk is longer
 
 
 class Port(NamedTuple):
-    """Hand, coupling and device of one world; d velocities of the world, d_t of the tool and the device."""
+    """Hand, coupling and device of one world; `iapb.system` makes it from the fields."""
 
     coupling: int  # NO_COUPLING, FOUR_CHANNEL, UNILATERAL
     device: Any  # whether there is one (`iapb.compiled.flag`)
@@ -33,48 +32,48 @@ class Port(NamedTuple):
     v_stop: int
     hand_body: int  # held body in the world
     device_body: int  # the same in the device
-    hand_point: np.ndarray  # (3,) [m] held point in the body's frame
-    wrench: np.ndarray  # (6,) force [N] and torque [N m] of the hand, world axes
-    planned: np.ndarray  # (n, 6) the wrench of the coming steps; n = 0: it does not change
-    stiffness: np.ndarray  # (d_t,) K [N/m, N m/rad]
-    damping: np.ndarray  # (d_t,) B [N s/m, N m s/rad]
+    hand_point: Annotated[Floats, "3"]  # [m] held point in the body's frame
+    wrench: Annotated[Floats, "6"]  # force [N] and torque [N m] of the hand, world axes
+    planned: Annotated[Floats, "planned 6"]  # the wrench of the coming steps; empty: it does not change
+    stiffness: Annotated[Floats, "tool"]  # K [N/m, N m/rad]
+    damping: Annotated[Floats, "tool"]  # B [N s/m, N m s/rad]
     mechanism: MechanismArrays  # the device: kinematically the tool
     body: Workspace
     varying_inertia: bool
     free: FreeMotion  # of the device alone
-    trees: np.ndarray  # (n_t,) int64 zeros: the device is one tree
-    device_q: np.ndarray  # (nq_t,)
-    device_v: np.ndarray  # (d_t,)
-    device_mass: np.ndarray  # (d_t, d_t)
-    device_lower: np.ndarray  # (d_t, d_t)
-    device_damping: np.ndarray  # (d_t,) physical damping b of the device
+    trees: Annotated[Integers, "tool_body"]  # zeros: the device is one tree
+    device_q: Annotated[Floats, "tool_coordinate"]
+    device_v: Annotated[Floats, "tool"]
+    device_mass: Annotated[Floats, "tool tool"]
+    device_lower: Annotated[Floats, "tool tool"]
+    device_damping: Annotated[Floats, "tool"]  # physical damping b of the device
     damped: bool
-    force_limit: np.ndarray  # (d_t,) [N, N m], inf = none
+    force_limit: Annotated[Floats, "tool"]  # [N, N m], inf = none
     limited: bool  # the actuators clip the commanded force to force_limit
-    resolution: np.ndarray  # (d_t,) [m, rad] of the position sensors, in the tangent where q is no vector
+    resolution: Annotated[Floats, "tool"]  # [m, rad] of the position sensors, in the tangent where q is no vector
     quantised: bool
     pulsed: bool  # an impulse is rendered over more than one step
-    pulse_weights: np.ndarray  # (w,) shares of an impulse in the w steps after it, sum 1
-    pulse_pending: np.ndarray  # (w, d_t) ring of forces still to be rendered [N, N m]
-    pulse_force: np.ndarray  # (d_t,) force of the pulses in this step
-    pulse_balance: np.ndarray  # (1,) [J] loss in the tool's collisions minus the work of the pulses on the device
-    pulse_held: np.ndarray  # (1,) int64: steps in which the observer held a pulse back
-    delayed_force: np.ndarray  # (n + 1, d_t) ring of actuator forces on their way; n = 0: no delay
-    delayed_q: np.ndarray  # (n + 1, nq_t) ring of measured positions on their way
-    delayed_v: np.ndarray  # (n + 1, d_t)
-    sensed_q: np.ndarray  # (nq_t,) positions read by the sensors
-    measured_q: np.ndarray  # (nq_t,) position of the device as the simulation reads it
-    measured_v: np.ndarray  # (d_t,)
-    hand_force: np.ndarray  # (d,) of the hand on the tool
-    device_hand_force: np.ndarray  # (d_t,) of the hand on the device
-    coupling_force: np.ndarray  # (d,) on the tool
-    environment_force: np.ndarray  # (d,) F_env (26)
-    device_force: np.ndarray  # (d_t,) of the actuators on the device
-    applied: np.ndarray  # (d,) sum of hand and coupling force
-    error: np.ndarray  # (d_t,) scratch
-    acceleration: np.ndarray  # (d_t,) scratch
-    engaged: np.ndarray  # (1,) bool: the unilateral coupler is on
-    clock: np.ndarray  # (1,) int64: steps done
+    pulse_weights: Annotated[Floats, "weight"]  # shares of an impulse in the w steps after it, sum 1
+    pulse_pending: Annotated[Floats, "weight tool"]  # ring of forces still to be rendered [N, N m]
+    pulse_force: Annotated[Floats, "tool"]  # force of the pulses in this step
+    pulse_balance: Annotated[Floats, "1"]  # [J] loss in the tool's collisions minus the work of the pulses
+    pulse_held: Annotated[Integers, "1"]  # steps in which the observer held a pulse back
+    delayed_force: Annotated[Floats, "slot tool"]  # ring of actuator forces on their way; one slot: no delay
+    delayed_q: Annotated[Floats, "slot tool_coordinate"]  # ring of measured positions on their way
+    delayed_v: Annotated[Floats, "slot tool"]
+    sensed_q: Annotated[Floats, "tool_coordinate"]  # positions read by the sensors
+    measured_q: Annotated[Floats, "tool_coordinate"]  # position of the device as the simulation reads it
+    measured_v: Annotated[Floats, "tool"]
+    hand_force: Annotated[Floats, "velocity"]  # of the hand on the tool
+    device_hand_force: Annotated[Floats, "tool"]  # of the hand on the device
+    coupling_force: Annotated[Floats, "velocity"]  # on the tool
+    environment_force: Annotated[Floats, "velocity"]  # F_env (26)
+    device_force: Annotated[Floats, "tool"]  # of the actuators on the device
+    applied: Annotated[Floats, "velocity"]  # sum of hand and coupling force
+    error: Annotated[Floats, "tool"]  # scratch
+    acceleration: Annotated[Floats, "tool"]  # scratch
+    engaged: Annotated[Booleans, "1"]  # the unilateral coupler is on
+    clock: Annotated[Integers, "1"]  # steps done
 
 
 # Measurement of the device: quantised sensors and delay.
@@ -147,22 +146,16 @@ def feel_hand(world, state, port):
     """Write the hand's J_hᵀF_h on the tool and on the device, each at its own pose; zeros if the wrench is zero."""
     port.hand_force[:] = 0.0
     port.device_hand_force[:] = 0.0
-    if not pushes(port):
+    pushing = False
+    for k in range(port.wrench.shape[0]):
+        pushing = pushing or port.wrench[k] != 0.0
+    if not pushing:
         return
     forward_kinematics(world.mechanism, state.q, state.body)
     press(world.mechanism, state.body, port.hand_body, port, port.hand_force)
     if port.coupling != NO_COUPLING:
         forward_kinematics(port.mechanism, port.device_q, port.body)
         press(port.mechanism, port.body, port.device_body, port, port.device_hand_force)
-
-
-@kernel
-def pushes(port):
-    """Return whether the wrench of the hand is not zero."""
-    pushing = False
-    for k in range(port.wrench.shape[0]):
-        pushing = pushing or port.wrench[k] != 0.0
-    return pushing
 
 
 @kernel
@@ -205,7 +198,13 @@ def shape_impulse(world, state, port):
     """
     slots = port.pulse_weights.shape[0]
     now = port.clock[0] % slots
-    power = hand_out(world, state, port, now)
+    power = 0.0  # [W] of the force due now, on the moving device
+    for i in range(port.pulse_force.shape[0]):
+        force = state.impulse[port.v_start + i] / world.dt
+        if force != 0.0:
+            for j in range(slots):
+                port.pulse_pending[(now + j) % slots, i] += port.pulse_weights[j] * force
+        power += port.pulse_pending[now, i] * port.device_v[i]
     for line in range(state.impacts.logged[0]):
         if state.impacts.group[line] == state.island_of_tree[port.tool_tree]:
             port.pulse_balance[0] += state.impacts.energy_lost[line]
@@ -219,20 +218,6 @@ def shape_impulse(world, state, port):
             due = 0.0
         port.pulse_force[i] = due
         port.environment_force[port.v_start + i] += due - state.impulse[port.v_start + i] / world.dt
-
-
-@kernel
-def hand_out(world, state, port, now):
-    """Add the step's impulse to the pending forces; return the power [W] of the force due now on the moving device."""
-    slots = port.pulse_weights.shape[0]
-    power = 0.0
-    for i in range(port.pulse_force.shape[0]):
-        force = state.impulse[port.v_start + i] / world.dt
-        if force != 0.0:
-            for j in range(slots):
-                port.pulse_pending[(now + j) % slots, i] += port.pulse_weights[j] * force
-        power += port.pulse_pending[now, i] * port.device_v[i]
-    return power
 
 
 @kernel

@@ -189,7 +189,7 @@ class SpatialHand(Hand):
         (0.0,) * 6, description="constant force and torque [N, N, N, N m, N m, N m], world axes; default: none")
 
 
-Waveform = Literal["step", "brake", "ring-rubber", "ring-wood", "ring-aluminium"]
+Waveform = Literal["step", "brake"]
 
 
 class Device(Part):
@@ -203,8 +203,8 @@ class Device(Part):
         "coordinate [m, rad]; default: exact")
     damping: PerCoordinate | None = Field(None, description="physical damping per coordinate [N s/m, N m s/rad]; "
         "default: none")
-    waveform: Waveform = Field("step", description="how an impulse reaches the hand: in one step, as a brake, or "
-        "ringing; default step")
+    waveform: Waveform = Field("step", description="how an impulse reaches the hand: in one step, or as a "
+        "brake; default step")
 
 
 class Gains(Part):

@@ -218,7 +218,7 @@ class Tape:
         self.deadlines: Deadlines | None = None
         self._recorder = Recorder(simulation)
         self._record, self._size = self._recorder.blank(steps)
-        simulation.stepper.prepare(self._record)
+        simulation.prepare(self._record, singly=True)
         self._spare: tuple[Record, int] | None = None
         self._line, self._seconds = 0, 0.0
 
@@ -233,7 +233,7 @@ class Tape:
             self._keep()
             self._record, self._size = self._spare or self._recorder.blank(self._total)
             self._spare = None
-        self._simulation.stepper.write(self._record, self._line, self._simulation.steps_done - 1)
+        self._simulation.write(self._record, self._line)
         self._line += 1
 
     def add_time(self, seconds: float) -> None:

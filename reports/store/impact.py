@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import RunFileError
-from iapb.run import ContactTable, ImpactTable, Run, blank, digests, quantities
+from iapb.run import ContactTable, ImpactTable, Run, digests
+from iapb.schema import blank, quantities
 from reports.store.io import opened, read_values, write_quantity, write_scale, write_text
 from reports.store.runs import write_run
 from verification.impacts import Floats, ImpactCase

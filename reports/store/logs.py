@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import RunFileError
-from iapb.recording import CONTACTS, IMPACTS, STATES, STEPS
-from iapb.run import Quantity
+from iapb.recording import LINES
+from iapb.schema import Quantity
 from reports.store.io import sync
 
 LOG_SUFFIX = ".log"
@@ -91,11 +91,10 @@ class RunLog:
 
     def write_chunk(self, record: Any, steps: int, seconds: float, more: Sequence[NDArray[Any]] = ()) -> None:
         """Append the first `steps` steps of a chunk; `more` are additional columns of the caller."""
-        contacts, impacts = (int(count) for count in record.used)
-        columns = [getattr(record.steps, each.name)[:steps] for each in (*STATES, *STEPS)]
-        columns.append(record.contact_count[:steps])
-        columns += [getattr(record.contacts, each.name)[:contacts] for each in CONTACTS]
-        columns += [getattr(record.impacts, each.name)[:impacts] for each in IMPACTS]
+        _, contacts, impacts = (int(count) for count in record.used)
+        columns = [getattr(getattr(record, name), each.name)[:count]
+                   for (name, listed), count in zip(LINES.items(), (steps, contacts, impacts), strict=True)
+                   for each in listed]
         line = {"kind": CHUNK, "steps": steps, "contacts": contacts, "impacts": impacts, "seconds": seconds}
         self._write_block(line, [*columns, *(column[:steps] for column in more)])
         self.steps += steps
@@ -247,9 +246,7 @@ def record_of(path: Path, block: Block, lengths: Mapping[str, int], more: int = 
             **{each.name: column([rows[name] for name in each.dimensions], each.dtype) for each in listed})
 
     try:
-        lines = columns((*STATES, *STEPS))
-        record = SimpleNamespace(steps=lines, contact_count=column((steps,), np.int64), contacts=columns(CONTACTS),
-                                 impacts=columns(IMPACTS), used=(contacts, impacts))  # fmt: skip
+        record = SimpleNamespace(used=(steps, contacts, impacts), **{name: columns(LINES[name]) for name in LINES})
         own = column((steps, more), np.float64)
     except ValueError as error:
         raise RunFileError(f"{path}: the chunk at byte {block.start} belongs to another scene") from error

@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from iapb.run import STATE_NAMES, ContactTable, ImpactTable, Quantity, Run, quantities
+from iapb.run import STATE_NAMES, ContactTable, ImpactTable, Run
+from iapb.schema import Quantity, quantities
 
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"

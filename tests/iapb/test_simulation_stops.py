@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
-
 import numpy as np
 import pytest
 
@@ -14,23 +12,12 @@ from iapb.haptics.coupling import FourChannel
 from iapb.run import FREE, Run
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED, Simulation, simulate
+from tests.iapb.test_recording import results_of
 
 PEG = load_scene(find_scene("peg_corner")).with_values(
     {"bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1}
 )
 STEPS = 350
-
-
-def arrays_of(record):
-    """Every array of numbers in a run, its tables and its ledger included."""
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if is_dataclass(value):
-            yield from arrays_of(value)
-        elif isinstance(value, dict):
-            yield from ((f"{field.name}/{key}", each) for key, each in value.items() if isinstance(each, np.ndarray))
-        elif isinstance(value, np.ndarray):
-            yield field.name, value
 
 
 class Wrapped:
@@ -56,13 +43,8 @@ def assert_readable(run: Run, steps: int) -> None:
     assert not run.complete and run.stopped and run.steps == steps
     assert len(run.penalty_force) == len(run.state) == steps and run.contacts.offsets[-1] == len(run.contacts.gap)
     assert np.all(run.impacts.step < steps)
-    for name, values in arrays_of(run):
+    for name, values in results_of(run).items():
         assert np.all(np.isfinite(values)), name
-
-
-def test_a_complete_run_says_so():
-    run = simulate(PEG, steps=5)
-    assert run.complete and run.stopped == ""
 
 
 def stop_after(chunks):
@@ -92,18 +74,13 @@ def test_ctrl_c_inside_a_law_written_in_python_keeps_the_steps_done():
         raise KeyboardInterrupt
 
     assert_readable(simulate(PEG, Wrapped(interrupt, after=200), steps=STEPS), 200)
-
-
-def test_ctrl_c_before_the_first_step_is_ctrl_c():
-    def interrupt(result):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt):  # before the first step
         simulate(PEG, Wrapped(interrupt), steps=STEPS)
 
 
 def test_ctrl_c_after_the_last_step_leaves_a_complete_run():
-    assert simulate(PEG, steps=20, progress=stop_after(1)).complete
+    run = simulate(PEG, steps=20, progress=stop_after(1))
+    assert run.complete and run.stopped == ""
 
 
 # Between two walls each stroke multiplies the speed by K dt² / m = 2000: the doubles end after a hundred strokes.

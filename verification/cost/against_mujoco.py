@@ -112,7 +112,7 @@ class OwnLoop:
         simulation, record = self.simulation, self.record(self.steps)
         before = simulation.state.q.copy()
         _, seconds = timed(lambda: simulation.advance_chunk(record, self.steps))
-        self.contacts = float(record.contact_count.mean())
+        self.contacts = float(record.steps.contact_count.mean())
         self.moved = float(np.abs(simulation.state.q - before).max())
         return seconds / self.steps
 

@@ -69,7 +69,7 @@ def _cost(n: int) -> dict[str, Any]:
             record = make_record(CHUNK_STEPS, sizes, simulation.system.capacity, n)
             _, spent = timed(partial(simulation.advance_chunk, record, CHUNK_STEPS))
             quickest[k] = min(quickest[k], spent)
-            contacts += float(record.contact_count.mean()) / CHUNKS
+            contacts += float(record.steps.contact_count.mean()) / CHUNKS
             tested += _tested(simulation) / CHUNKS
     seconds = sum(quickest) / (CHUNKS * CHUNK_STEPS)
     return {"bodies": n, "step": seconds * 1e6, "contacts": contacts, "pairs of shapes": len(simulation.world.pairs),

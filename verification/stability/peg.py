@@ -37,7 +37,7 @@ DEVICES: dict[str, tuple[float, dict[str, Any]]] = {
     "1 kHz": (1000.0, {}),
     "1 kHz, late sensors": (1000.0, LATE),
 }
-WAVEFORM_RATE = 1000.0  # [Hz]: aluminium rings at 300 Hz
+WAVEFORM_RATE = 1000.0  # [Hz]
 COLUMNS = titled(("device", "stiffness [N/m]", "damping [N s/m]", "world", "settles after [s]", "bounces",
                   "penetration [mm]", "stopped")).columns  # fmt: skip
 PULSE_COLUMNS = titled((

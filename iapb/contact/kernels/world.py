@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.free_motion import FreeMotion
+from iapb.schema import Booleans, Floats, Integers, States
 
 
 class Switches(NamedTuple):
@@ -88,51 +89,54 @@ class World(NamedTuple):
 
 
 class State(NamedTuple):
-    """Everything that changes from step to step, and the scratch of the step."""
+    """Everything that changes from step to step, and the scratch of the step; `iapb.system` makes it from the fields.
 
-    q: np.ndarray  # (nq,)
-    v: np.ndarray  # (d,)
-    mass_matrix: np.ndarray  # (d, d)
-    lower: np.ndarray  # (d, d) its Cholesky factor
+    A row is one of an impact: of a contact, or of one of its two bodies (`per_body_rows`).
+    """
+
+    q: Annotated[Floats, "coordinate"]
+    v: Annotated[Floats, "velocity"]
+    mass_matrix: Annotated[Floats, "velocity velocity"]
+    lower: Annotated[Floats, "velocity velocity"]  # its Cholesky factor
     body: Workspace  # placements and mechanics scratch
     contacts: ContactBuffer  # of this step
     previous: ContactBuffer  # of the step before
     stage_contacts: ContactBuffer  # at an inner stage of the integrator
-    contact_count: np.ndarray  # (2,) int64: contacts now, contacts in the step before
-    group_of_tree: np.ndarray  # (t,) int64: first tree of its contact group
-    state_of_tree: np.ndarray  # (t,) int8: FREE, COLLIDING, RESTING
-    island_of_tree: np.ndarray  # (t,) int64: first tree of its island, resolved in one impact
-    collides_of_tree: np.ndarray  # (t,) bool: the first tree of an island that collides
-    row_budget: np.ndarray  # (1,) int64: largest number of rows used in an impact, most violated first
-    spreading: np.ndarray  # (t,) bool: an impulse is still being spread over steps
-    penalty_force: np.ndarray  # (d,) [N, N m]
-    friction_force: np.ndarray  # (d,)
-    impulse: np.ndarray  # (d,) generalized impulse of the step [N s, N m s]
-    stage_penalty: np.ndarray  # (d,) the same at one stage of the integrator
-    stage_friction: np.ndarray  # (d,)
-    bias: np.ndarray  # (d,) B or G, scratch
-    acceleration: np.ndarray  # (d,)
-    start_q: np.ndarray  # (nq,) scratch of the integrators
-    start_v: np.ndarray  # (d,) velocity after the impact
-    mean_v: np.ndarray  # (d,)
-    mean_acceleration: np.ndarray  # (d,)
-    contact_impulse: np.ndarray  # (c,) [N s] per contact, minimum norm
-    rows: np.ndarray  # (c,) int64: contact of each row of the present impact
-    dofs: np.ndarray  # (d,) int64: coordinates of the present group
-    group_mass: np.ndarray  # (d, d)
-    group_lower: np.ndarray  # (d, d)
-    group_v: np.ndarray  # (d,)
-    group_v_plus: np.ndarray  # (d,)
-    group_impulse: np.ndarray  # (d,)
-    row_impulse: np.ndarray  # (rows,)
-    row_restitution: np.ndarray  # (rows,)
-    row: np.ndarray  # (d,) one contact row nᵀJ
+    contact_count: Annotated[Integers, "2"]  # contacts now, contacts in the step before
+    group_of_tree: Annotated[Integers, "tree"]  # first tree of its contact group
+    state_of_tree: Annotated[States, "tree"]  # FREE, COLLIDING, RESTING
+    island_of_tree: Annotated[Integers, "tree"]  # first tree of its island, resolved in one impact
+    collides_of_tree: Annotated[Booleans, "tree"]  # the first tree of an island that collides
+    row_budget: Annotated[Integers, "1"]  # largest number of rows used in an impact, most violated first
+    spreading: Annotated[Booleans, "tree"]  # an impulse is still being spread over steps
+    penalty_force: Annotated[Floats, "velocity"]  # [N, N m]
+    friction_force: Annotated[Floats, "velocity"]
+    impulse: Annotated[Floats, "velocity"]  # generalized impulse of the step [N s, N m s]
+    stage_penalty: Annotated[Floats, "velocity"]  # the same at one stage of the integrator
+    stage_friction: Annotated[Floats, "velocity"]
+    bias: Annotated[Floats, "velocity"]  # B or G, scratch
+    acceleration: Annotated[Floats, "velocity"]
+    start_q: Annotated[Floats, "coordinate"]  # scratch of the integrators
+    start_v: Annotated[Floats, "velocity"]  # velocity after the impact
+    mean_v: Annotated[Floats, "velocity"]
+    mean_acceleration: Annotated[Floats, "velocity"]
+    contact_impulse: Annotated[Floats, "row"]  # [N s] per contact, minimum norm
+    rows: Annotated[Integers, "row"]  # contact of each row of the present impact
+    dofs: Annotated[Integers, "velocity"]  # coordinates of the present group
+    group_mass: Annotated[Floats, "velocity velocity"]
+    group_lower: Annotated[Floats, "velocity velocity"]
+    group_v: Annotated[Floats, "velocity"]
+    group_v_plus: Annotated[Floats, "velocity"]
+    group_impulse: Annotated[Floats, "velocity"]
+    row_impulse: Annotated[Floats, "row"]
+    row_restitution: Annotated[Floats, "row"]
+    row: Annotated[Floats, "velocity"]  # one contact row nᵀJ
     work: ImpactWork
     push_work: PushWork
     friction_work: FrictionWork
     step_friction: StepFriction
     rest_work: RestWork
-    located_q: np.ndarray  # (nq,) configuration of mass_matrix and lower; NaN: any
-    root_momentum: np.ndarray  # (9 t,) scratch of free motion: a root's momentum and its centre
-    tree_energy: np.ndarray  # (t,) the same
+    located_q: Annotated[Floats, "coordinate"]  # configuration of mass_matrix and lower; NaN: any
+    root_momentum: Annotated[Floats, "root"]  # scratch of free motion: a root's momentum and its centre
+    tree_energy: Annotated[Floats, "tree"]  # of a tree, in free motion
     impacts: Any  # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the step

@@ -165,7 +165,6 @@ def test_an_effect_that_is_off_would_change_no_bit(name: str) -> None:
     assert not getattr(off.world.switches, name)
     switches = on.world.switches._content._replace(**{name: True})
     on.world = block(on.world._content._replace(switches=switches))
-    on.stepper = type(on.stepper)(on.world, on.state, on.port, None)
     for _ in range(300):
         off.step()
         on.step()

@@ -122,7 +122,7 @@ ONLY = {
     "quantisation": (["def sense("], "everything", ["exact sensors", "sensors of resolution 0", "no device"]),
     "device_damping": (["a[i] -= port.device_damping[i] * port.device_v[i]"], "everything",
                        ["no device damping", "device damping 0", "no device"]),
-    "waveform": (["def shape_impulse(", "def hand_out(", "def observe_work("], "brake",
+    "waveform": (["def shape_impulse(", "def observe_work("], "brake",
                  ["everything", "brake, no impulses", "brake, unilateral"]),
     "hand_force": (["def press(", "def add_point_force("], "no friction", ["hand holds still", "pendulum"]),
     "joint_damping": (["def damp_joints("], "damped", ["pendulum", "limited", "everything"]),
