@@ -231,6 +231,13 @@ class Simulation:
             self._advance.taking(world, state, port.applied)
         if self.link is None and port.coupling != NO_COUPLING:
             self._move.taking(*blocks)
+        if not self.compiled and self.keeps_no_state:  # a law in Python takes a first step, which is then undone
+            before = [array.copy() for array in self.arrays()]
+            with suppress(IapbError):  # the first step will say so
+                self.step()
+            for array, values in zip(self.arrays(), before, strict=True):
+                array[...] = values
+            self.steps_done = 0
 
     def advance_chunk(self, record: Any, steps: int) -> tuple[int, BaseException | None]:
         """Do and record up to `steps` steps; return the number done, and the exception that stopped them or None."""

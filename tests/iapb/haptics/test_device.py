@@ -97,7 +97,7 @@ def test_physical_damping_takes_energy():
 def test_wrong_arguments_are_named(argument, settings):
     with pytest.raises(ArgumentError) as caught:
         SimulatedDevice(**{"mass_matrix": MASS, "q": REST, "dt": DT, **settings})
-    assert caught.value.argument == argument
+    assert caught.value.argument.split()[0] == argument
 
 
 GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)
