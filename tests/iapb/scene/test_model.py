@@ -24,6 +24,7 @@ def test_a_scene_keeps_its_text_and_reads_yaml_numbers_and_aliases() -> None:
     scene = scene_from_text(text)
     assert (scene.rate, scene.step, scene.steps, scene.bodies[0].inertia) == (1000.0, 1e-3, 500, 1e-3)
     assert scene.source_text == text and scene.hand is not None and scene.hand.point == (0.0, 1.0)
+    assert not {"stiffness", "damping"} & set(scene.resolved()["contact"])  # the toolkit will choose them
 
 
 def test_the_text_of_a_scene_reads_back_as_the_same_scene() -> None:
