@@ -107,7 +107,7 @@ def touching_row() -> Scene:
 
 def each_its_own(scene: Scene, field: str) -> Scene:
     """Bodies and walls with values of their own, some with none."""
-    values = {f"bodies.{body.name}.{field}": (0.1, None, 0.8)[k % 3] for k, body in enumerate(scene.bodies)}
+    values = {f"bodies.{body.name}.{field}": (0.1, None, 1.0)[k % 3] for k, body in enumerate(scene.bodies)}
     return scene.with_values(values | {f"walls.{wall.name}.{field}": (0.3, None)[k % 2]
                                        for k, wall in enumerate(scene.walls)})
 
