@@ -20,11 +20,11 @@ import os
 import struct
 import warnings
 from collections import namedtuple
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, cached_property, partial
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -40,7 +40,6 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
-from numpy.typing import NDArray
 
 from iapb.inlining import compile_as_whole
 
@@ -188,8 +187,6 @@ class Block:
 
     block_type: BlockType
     address: int  # of the layout in memory
-    _folded: tuple[_Tree, np.ndarray, int, Sequence[np.ndarray]]  # only in a twin: what it is made of
-    _piece: np.ndarray | None = None  # only in a twin: memory of its layouts, then of its arrays
 
     def __init__(self, content: Any) -> None:
         members = [block(value) if _is_named_tuple(value) else value for value in content]
@@ -199,74 +196,6 @@ class Block:
         words = [word for member in members for word in _layout(member)]
         self._memory = np.array(words, dtype=np.int64)
         self.address = self._memory.ctypes.data
-
-    def twin(self) -> Block:
-        """Return a copy with the same layout and its own memory; this is faster than making a new block.
-
-        Its layouts and arrays lie in one piece of memory. The Python objects of a nested block are made at first use.
-        """
-        plan = self._plan
-        raw = np.empty(plan.size + _LINE, np.uint8)
-        start = address_of(raw)
-        piece = raw[-start % _LINE:][: plan.size]
-        words, base = piece[: plan.words.nbytes].view(np.int64), start + -start % _LINE
-        words[:] = plan.words
-        words[plan.blocks] += base
-        words[plan.arrays] += base
-        made = _unfolded(plan.tree, piece, base, ())
-        made._plan, made._piece = plan, piece
-        if self._piece is not None:
-            piece[plan.words.nbytes :] = self._piece[plan.words.nbytes :]
-        else:
-            for ours, theirs in zip(made.arrays(), self.arrays(), strict=True):
-                ours[...] = theirs
-        return made
-
-    def on(self, arrays: Sequence[np.ndarray], addresses: NDArray[np.int64]) -> Block:
-        """Return a block like this one with other arrays of the same shapes, in the order of `arrays()`.
-
-        `addresses` are those of their first entries.
-        """
-        plan = self._plan
-        words = plan.words.copy()
-        base = address_of(words)
-        words[plan.blocks] += base
-        words[plan.arrays] = addresses
-        return _unfolded(plan.tree, words.view(np.uint8), base, arrays)
-
-    @cached_property
-    def _plan(self) -> _Plan:
-        """Positions of all layouts and arrays in a twin."""
-        blocks = list(self._with_nested())
-        starts = np.cumsum([0, *(_rounded(each._memory.nbytes) for each in blocks)]).tolist()
-        words, nested, at = np.zeros(starts[-1] // 8, np.int64), [], starts[-1]
-        parts: dict[int, _Part] = {}  # by the word of its address
-        trees: dict[int, _Tree] = {}
-        places = dict(zip(map(id, blocks), starts, strict=False))
-        for each in blocks:
-            first = places[id(each)] // 8
-            words[first : first + len(each._memory)] = each._memory
-            for member, place in zip(each._content, each.block_type.places, strict=True):
-                if isinstance(member, np.ndarray):
-                    words[first + place + 4] = at
-                    parts[first + place + 4] = _Part(len(parts), at, member.shape, member.dtype, member.strides)
-                    at += _rounded(member.nbytes)
-                elif isinstance(member, Block):
-                    words[first + place] = places[id(member)]
-                    nested.append(first + place)
-        for each in reversed(blocks):  # nested ones first
-            first, size = places[id(each)], each._memory.nbytes
-            members = [parts[first // 8 + place + 4] if isinstance(member, np.ndarray) else
-                       trees[id(member)] if isinstance(member, Block) else member
-                       for member, place in zip(each._content, each.block_type.places, strict=True)]
-            trees[id(each)] = _Tree(first, first + size, type(each._content), each.block_type, members)
-        return _Plan(at, words, np.array(nested, np.int64), np.array([*parts], np.int64), trees[id(self)])
-
-    def _with_nested(self) -> Iterator[Block]:
-        yield self
-        for member in self._content:
-            if isinstance(member, Block):
-                yield from member._with_nested()
 
     def __reduce__(self) -> Any:
         """Refuse copy and pickle: a copy would hold the address of this block's memory."""
@@ -278,64 +207,12 @@ class Block:
         return [*(member for member in self._content if isinstance(member, np.ndarray)), *chain(*nested)]
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # not yet made
-            if name == "_content" and "_folded" in self.__dict__:
-                tree, piece, base, given = self._folded
-                self._content = tree.kind(*[
-                    (given[member.number] if given else
-                     np.ndarray(member.shape, member.dtype, piece, member.at, member.strides))
-                    if type(member) is _Part else
-                    _unfolded(member, piece, base, given) if type(member) is _Tree else member
-                    for member in tree.members])
-                return self._content
-            raise AttributeError(name)  # as when unpickling
+        if name.startswith("_"):  # as when unpickling
+            raise AttributeError(name)
         return getattr(self._content, name)
 
 
-class _Part(NamedTuple):
-    """An array of a twin: its number, its first byte in the twin's memory, shape, dtype and strides."""
-
-    number: int
-    at: int
-    shape: tuple[int, ...]
-    dtype: np.dtype[Any]
-    strides: tuple[int, ...]
-
-
-class _Tree(NamedTuple):
-    """A block of a twin: first and last byte of its layout in the twin's memory, its type and its members."""
-
-    at: int
-    stop: int
-    kind: Callable[..., Any]
-    block_type: BlockType
-    members: list[Any]  # parts, trees and numbers
-
-
-class _Plan(NamedTuple):
-    """The plan of a twin: size in bytes, layouts with addresses relative to 0, and the words that hold addresses."""
-
-    size: int
-    words: np.ndarray
-    blocks: np.ndarray
-    arrays: np.ndarray
-    tree: _Tree
-
-
-def _unfolded(tree: _Tree, piece: np.ndarray, base: int, given: Sequence[np.ndarray]) -> Block:
-    """Make a block of a twin with its address only; its members are made at first use."""
-    made = object.__new__(Block)
-    made.block_type, made.address, made._folded = tree.block_type, base + tree.at, (tree, piece, base, given)
-    made._memory = piece[tree.at : tree.stop].view(np.int64)
-    return made
-
-
-_LINE = 64  # bytes of a cache line; every array of a twin starts at a new line
 _CODES: dict[Any, Callable[..., Any]] = {}  # kernel and types -> its machine code
-
-
-def _rounded(size: int) -> int:
-    return -(-size // _LINE) * _LINE
 
 
 def columns(name: str, arrays: Mapping[str, Any]) -> Any:

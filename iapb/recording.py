@@ -18,7 +18,7 @@ from iapb.haptics.kernels import PLANNED
 from iapb.linalg import load, store
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.mechanism import Mechanism
-from iapb.run import ContactTable, EffectRow, ImpactTable, Later, Run, digests
+from iapb.run import UNSOLVED, ContactTable, EffectRow, ImpactTable, Later, Run, digests
 from iapb.scene.model import SpatialScene
 from iapb.schema import Floats, Quantity, blank, quantities
 
@@ -241,6 +241,7 @@ class Recorder:
             "energy": Later(lambda run: _shown(ledger(run), run)),
             "distrust": Later(partial(_distrust, self._at_first)),
         }
+        remarks = system.remarks + (UNSOLVED,) * bool(simulation.state.rest_work.counts[1])
         return Run(
             scene_name=scene.name, world=world or f"{law.name} + {coupling.name}",
             law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
@@ -254,7 +255,7 @@ class Recorder:
             effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores) for one in simulation.effects),
             chunk_steps=np.array([steps for _, steps, _ in self.chunks], np.int64),
             chunk_seconds=np.array([seconds for _, _, seconds in self.chunks], np.float64),
-            kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=system.remarks, **later,
+            kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=remarks, **later,
         )
 
     @property

@@ -22,6 +22,7 @@ from iapb.lazy import extension, needed
 from iapb.schema import Booleans, Floats, Integers, Quantity, States, along, quantities
 
 FREE, COLLIDING, RESTING = 0, 1, 2  # contact states of the paper, section III
+UNSOLVED = "resting contact was not solved to rounding, and velocities were shortened"  # begins a remark
 STATE_NAMES = ("free", "colliding", "resting")
 _SHOWN = 12  # most coordinates that a plot or a table shows
 

@@ -18,7 +18,7 @@ from iapb.mechanics.energy import FORCES, energy_ledger, moved_straight
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
-from iapb.run import Run
+from iapb.run import UNSOLVED, Run
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of
 from iapb.scene.model import scene_kind
@@ -50,7 +50,8 @@ def distrust_of(run: Run) -> tuple[str, ...]:
         if (seen.mechanism.nq, seen.mechanism.nv) != (run.q.shape[1], run.v.shape[1]):
             return ()  # the record's scene does not describe its bodies
         reasons = (_energy, _sank, _passed, _squeezed, _flew, _overran, _spun)
-        return tuple(why for reason in reasons for why in reason(seen))
+        unsolved = [remark for remark in run.remarks if remark == UNSOLVED]
+        return tuple(unsolved + [why for reason in reasons for why in reason(seen)])
 
 
 class _Seen:

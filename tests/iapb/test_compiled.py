@@ -88,38 +88,6 @@ def test_a_kernel_without_allocation_compiles(function):
     assert kernel(function)(x) == function(x)
 
 
-def imported_modules(path: Path) -> set[str]:
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("iapb"):
-            found |= {node.module, *(f"{node.module}.{name.name}" for name in node.names)}
-    return found
-
-
-def reached_from(start: str) -> dict[str, Path]:
-    """Modules of the engine that a module imports, directly or not."""
-    found: dict[str, Path] = {}
-    waiting = [start]
-    while waiting:
-        name = waiting.pop()
-        stem = ENGINE.parent.joinpath(*name.split("."))
-        path = next((p for p in (stem.with_suffix(".py"), stem / "__init__.py") if p.is_file()), None)
-        if path is not None and name not in found:
-            found[name] = path
-            waiting += imported_modules(path)
-    return found
-
-
-def test_every_kernel_that_the_loop_can_reach_is_compiled_without_an_allocator():
-    """`njit` alone, which may allocate, is named nowhere but where `kernel` is made of it."""
-    reached = reached_from("iapb.haptics.kernels") | reached_from("iapb.recording")
-    assert {"iapb.contact.kernels.step", "iapb.contact.kernels.collide", "iapb.mechanics.kernels"} <= reached.keys()
-    for name, path in reached.items():
-        if name not in ("iapb.compiled", "iapb.inlining"):
-            names = {node.id for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Name)}
-            assert "njit" not in names, name
-
-
 def test_kernels_are_compiled_without_fastmath_and_call_no_blas():
     dots = (ast.MatMult,)
     for path in ENGINE.rglob("*.py"):
@@ -283,61 +251,6 @@ def test_a_kernel_outside_the_engine_is_compiled_anew_when_its_own_file_changes(
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         assert module.scaled(x) == factor * 2.0
-
-
-class Leaf(NamedTuple):
-    """Nested."""
-
-    values: np.ndarray
-    flags: np.ndarray
-
-
-class Tree(NamedTuple):
-    """With numbers, an empty array and a nested tuple."""
-
-    inner: Leaf
-    size: float
-    matrix: np.ndarray
-    nothing: np.ndarray
-
-
-@kernel
-def fill(outer):
-    for k in range(outer.inner.values.shape[0]):
-        outer.inner.values[k] = outer.size + k
-        outer.inner.flags[k] = k
-    outer.matrix[1, 2] += outer.size
-    return outer.nothing.shape[1]
-
-
-def test_a_twin_is_a_block_of_its_own_in_aligned_memory() -> None:
-    first = block(Tree(Leaf(np.arange(3.0), np.arange(3, dtype=np.int8)), 7.0, np.ones((2, 3)), np.zeros((0, 4))))
-    copied = first.twin()
-    assert copied.block_type is first.block_type
-    for one, other in zip(first.arrays(), copied.arrays(), strict=True):
-        np.testing.assert_array_equal(one, other)
-        assert one.dtype == other.dtype and other.ctypes.data % 64 == 0 and not np.shares_memory(one, other)
-    assert fill(copied) == 4
-    np.testing.assert_array_equal(copied.inner.values, [7.0, 8.0, 9.0])
-    np.testing.assert_array_equal(first.inner.values, [0.0, 1.0, 2.0])
-    assert (copied.matrix[1, 2], first.matrix[1, 2]) == (8.0, 1.0)
-    before = copied.twin()
-    del copied
-    gc.collect()
-    assert before.inner.values[2] == 9.0 and fill(before) == 4
-
-
-def test_a_block_on_other_arrays_writes_into_them_alone() -> None:
-    first = block(Tree(Leaf(np.arange(3.0), np.arange(3, dtype=np.int8)), 7.0, np.ones((2, 3)), np.zeros((0, 4))))
-    large = [np.full((2 + len(array), *array.shape[1:]), 5, array.dtype) for array in first.arrays()]
-    places = np.array([array.__array_interface__["data"][0] + 2 * array.strides[0] for array in large])
-    moved = first.on([array[2:] for array in large], places)
-    assert moved.block_type is first.block_type and moved.size == 7.0 and fill(moved) == 4
-    matrix, nothing, values, flags = large
-    assert values.tolist() == [5.0, 5.0, 7.0, 8.0, 9.0] and flags.tolist() == [5, 5, 0, 1, 2]
-    assert matrix[3, 2] == 12.0 and (matrix == 5.0).sum() == 11 and nothing.shape == (2, 4)
-    assert moved.inner.values is moved.arrays()[2] and np.shares_memory(moved.inner.values, values)
-    assert first.matrix[1, 2] == 1.0 and first.inner.values.tolist() == [0.0, 1.0, 2.0]
 
 
 def test_the_address_of_an_array_is_that_of_its_first_entry() -> None:
