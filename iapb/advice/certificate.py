@@ -9,8 +9,8 @@ energies are not used, so impacts of other engines are judged in the same way.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -74,60 +74,73 @@ class Certificate:
     restitution_judged: bool = False
 
     @property
+    def _shares(self) -> dict[str, float]:
+        """Residual over tolerance of each condition other than energy; NaN if it is not judged."""
+        return {"momentum M(v⁺ − v⁻)": self.momentum / MOMENTUM_TOLERANCE,
+                "impulses in range(Jᵀ)": self.span / MOMENTUM_TOLERANCE,
+                "sum of a step's impulses": self.total / MOMENTUM_TOLERANCE,
+                "restitution": self.restitution / RESTITUTION_TOLERANCE if self.restitution_judged else np.nan}
+
+    @property
     def passed(self) -> bool:
         """No impact gained energy, and every judged residual is within its tolerance (NaN: not judged)."""
-        return self.gains == 0 and not self._named(lambda size: size > 1.0)
-
-    def _named(self, chosen: Callable[[float], bool]) -> list[str]:
-        """Names of the conditions other than energy for which `chosen(residual / tolerance)` is true."""
-        restitution = self.restitution if self.restitution_judged else np.nan
-        sizes = {"momentum M(v⁺ − v⁻)": self.momentum / MOMENTUM_TOLERANCE,
-                 "impulses in range(Jᵀ)": self.span / MOMENTUM_TOLERANCE,
-                 "sum of a step's impulses": self.total / MOMENTUM_TOLERANCE,
-                 "restitution": restitution / RESTITUTION_TOLERANCE}  # fmt: skip
-        return [name for name, size in sizes.items() if chosen(size)]
+        return self.gains == 0 and not any(share > 1.0 for share in self._shares.values())
 
     def words(self) -> str:
         """Return one line that says what is certified, what fails and what is not judged."""
-        wrong, open_ = self._named(lambda size: size > 1.0), self._named(np.isnan)
+        shares = self._shares.items()
+        wrong = [name for name, share in shares if share > 1.0]
         if not self.impacts:
             return f"no impact, and what is recorded does not fit: {', '.join(wrong)}" if wrong else \
                 "no impact: nothing to certify"
         energy = f"{self.gains} of {self.impacts} impacts gained energy" if self.gains else \
             f"none of {self.impacts} impacts gained energy, not in the last bit"
-        held = "; ".join(["no gain"] * (not self.gains) + self._named(lambda size: size <= 1.0)) or "nothing"
-        said = f"{energy} (exact). Certified: {held}."
-        if wrong:
-            said += f" Recorded impulses and velocities do not fit: {'; '.join(wrong)}."
-        if not np.isnan(self.restitution) and "restitution" in open_:
-            open_[open_.index("restitution")] = "restitution (only reported)"
-        return f"{said} Not judged: {'; '.join([*open_, 'forces between impacts'])}."
+        held = ["no gain"] * (not self.gains) + [name for name, share in shares if share <= 1.0]
+        reported = " (only reported)" * (not np.isnan(self.restitution))
+        open_ = [name + reported * (name == "restitution") for name, share in shares if np.isnan(share)]
+        fits = f" Recorded impulses and velocities do not fit: {'; '.join(wrong)}." if wrong else ""
+        return (f"{energy} (exact). Certified: {'; '.join(held) or 'nothing'}.{fits} "
+                f"Not judged: {'; '.join([*open_, 'forces between impacts'])}.")
 
 
 def exact_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Fraction:
     """KE⁺ − KE⁻ = ½ (v⁺ᵀMv⁺ − v⁻ᵀMv⁻) as a rational number."""
-    mass, before, after = (np.asarray(x, np.float64) for x in (mass_matrix, v_minus, v_plus))
-    entries, unit = _integers(mass.ravel())
-    speeds, speed_unit = _integers(np.concatenate((before, after)))
-    d, total = len(before), 0
-    for i in range(d):
-        for j in range(d):
-            if entries[i * d + j]:
-                change = speeds[d + i] * speeds[d + j] - speeds[i] * speeds[j]
-                total += entries[i * d + j] * change
+    (M, unit), (v, speed_unit) = _integers(mass_matrix), _integers(np.array([v_minus, v_plus], np.float64))
+    total = v[1] @ M @ v[1] - v[0] @ M @ v[0]
     return Fraction(total) * Fraction(2) ** (unit + 2 * speed_unit - 1)
 
 
-def _integers(values: Floats) -> tuple[list[int], int]:
-    """Return integers and one exponent such that values = integers · 2^exponent exactly."""
-    if not np.isfinite(values).all():
-        raise ArgumentError("velocity or mass_matrix", "a number that is not finite", "finite numbers")
-    mantissas, exponents = np.frexp(values)
+def _integers(values: ArrayLike) -> tuple[NDArray[np.object_], int]:
+    """Return integers of any length and one exponent such that values = integers · 2^exponent exactly."""
+    mantissas, exponents = np.frexp(_finite("velocity or mass_matrix", values))
     whole = (mantissas * 2.0**53).astype(np.int64)
-    present = whole != 0
-    least = int(exponents[present].min()) if present.any() else 0
-    shifts = np.where(present, exponents - least, 0)
-    return [int(m) << int(s) for m, s in zip(whole, shifts, strict=True)], least - 53
+    least = int(exponents[whole != 0].min(initial=0))
+    shifts = np.where(whole != 0, exponents - least, 0)
+    return whole.astype(object) << shifts.astype(object), least - 53
+
+
+def _finite(name: str, values: ArrayLike) -> Floats:
+    """Return the values as a contiguous array of doubles."""
+    array = np.ascontiguousarray(values, np.float64)
+    if not np.isfinite(array).all():
+        raise ArgumentError(name, "a number that is not finite", "finite numbers")
+    return array
+
+
+def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Return M (1, d, d) or (n, d, d), v⁻ and v⁺ (n, d), checked."""
+    before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
+    masses = np.asarray(mass_matrix, np.float64)
+    masses = masses[None] if masses.ndim == 2 else masses
+    if before.ndim != 2:
+        raise ArgumentError("v_minus", before.shape, "shape (n, d), or (d,) of one impact")
+    n, d = before.shape
+    if after.shape != (n, d):
+        raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
+    if masses.shape not in ((1, d, d), (n, d, d)):
+        raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
+    M, v, w = (_finite("v_minus, v_plus or mass_matrix", each) for each in (masses, before, after))
+    return M, v, w
 
 
 @dataclass(frozen=True)
@@ -147,20 +160,8 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
     IapbError
         The bound and the integers disagree, so this program or the processor has a fault.
     """
-    before, after = (np.ascontiguousarray(np.atleast_2d(np.asarray(v, np.float64))) for v in (v_minus, v_plus))
-    masses = np.ascontiguousarray(np.asarray(mass_matrix, np.float64))
-    masses = masses[None] if masses.ndim == 2 else masses
-    if before.ndim != 2:
-        raise ArgumentError("v_minus", before.shape, "shape (n, d), or (d,) of one impact")
-    n, d = before.shape
-    if after.shape != (n, d):
-        raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
-    if masses.shape not in ((1, d, d), (n, d, d)):
-        raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
-    finite = np.isfinite(before).all() and np.isfinite(after).all() and np.isfinite(masses).all()
-    if not finite:
-        raise ArgumentError("v_minus, v_plus or mass_matrix", "a number that is not finite", "finite numbers")
-    signs = np.empty(n, np.int64)
+    masses, before, after = _impacts(mass_matrix, v_minus, v_plus)
+    signs = np.empty(len(before), np.int64)
     gain_signs(masses, before, after, signs)
     gained, unsure = signs > 0, np.flatnonzero(signs == 0)
     for k in unsure:
@@ -195,18 +196,26 @@ def certify(run: Run) -> Certificate:
     IapbError
         The digest of the recomputed M differs from the recorded one.
     """
-    table = run.impacts
-    _check_finite(run)
-    total = _totals(run)
+    table, contacts, sums, size = run.impacts, run.contacts, -run.impulse, np.abs(run.impulse)
+    if len(table.step) and not (table.step.min() >= 0 and table.step.max() < len(run.impulse)):
+        raise ArgumentError("impacts.step", table.step.max(), f"steps from 0 to {len(run.impulse) - 1}")
+    for name in ("v_minus", "v_plus", "impulse", "scale"):
+        _finite(f"impacts.{name}", getattr(table, name))
+    for name in ("impulse", "normal", "point"):
+        _finite(f"contacts.{name}", getattr(contacts, name)[contacts.impulse != 0.0])
+    _finite("impulse", run.impulse)
+    _finite("q", run.q[table.step])
+    np.add.at(sums, table.step, table.impulse)
+    np.add.at(size, table.step, np.abs(table.impulse))
+    total = _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
     if not len(table.step):
-        return replace(certify_impacts(np.zeros((1, 1)), np.zeros((0, 1)), np.zeros((0, 1))), total=total)
+        return _certificate([], total=total)
     scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
     mechanism = mechanism_of(scene)
-    parts = [certify_impacts(*batch) for batch in _batches(run, mechanism)]
     span, restitution = _contacts(run, scene, mechanism)
     every_row = bool((table.rank >= table.rows).all())  # a row budget drops rows, and the record does not say why
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
-    return replace(_joined(parts), span=span, restitution=restitution, total=total, restitution_judged=judged)
+    return _certificate(_batches(run, mechanism), span, restitution, total, judged)
 
 
 def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
@@ -237,38 +246,12 @@ def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> I
     rounded. A complete file starts with `EXPORT_HEAD` and ends with "end" and the number of impacts. The arguments are
     those of `judge_gains`, for n impacts.
     """
-    before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
-    masses = np.asarray(mass_matrix, np.float64)
-    masses = masses if len(masses) == len(before) and masses.ndim == 3 else np.broadcast_to(
-        masses, (len(before), *masses.shape[-2:]))
+    masses, before, after = _impacts(mass_matrix, v_minus, v_plus)
+    masses = np.broadcast_to(masses, (len(before), *masses.shape[1:]))
     for mass, *velocities in zip(masses, before, after, strict=True):
         mantissas, exponents = np.frexp(np.concatenate((mass.ravel(), *velocities)))
         pairs = np.stack(((mantissas * 2.0**53).astype(np.int64), exponents - 53), axis=1)
         yield " ".join(map(str, (len(mass), *pairs.ravel().tolist())))
-
-
-def _check_finite(run: Run) -> None:
-    """Raise an ArgumentError that names an array with numbers that are not finite, or with steps outside the run."""
-    table, contacts = run.impacts, run.contacts
-    if len(table.step) and not (table.step.min() >= 0 and table.step.max() < len(run.impulse)):
-        raise ArgumentError("impacts.step", table.step.max(), f"steps from 0 to {len(run.impulse) - 1}")
-    struck = contacts.impulse != 0.0
-    arrays = {
-        "impacts.v_minus": table.v_minus, "impacts.v_plus": table.v_plus, "impacts.impulse": table.impulse,
-        "impacts.scale": table.scale, "impulse": run.impulse, "q": run.q[table.step],
-        "contacts.impulse": contacts.impulse, "contacts.normal": contacts.normal[struck],
-        "contacts.point": contacts.point[struck]}  # fmt: skip
-    for name, array in arrays.items():
-        if not np.isfinite(array).all():
-            raise ArgumentError(name, "a number that is not finite", "finite numbers")
-
-
-def _totals(run: Run) -> float:
-    """Return `Certificate.total`: the largest relative difference of a step's impulse and the sum over its impacts."""
-    table, total, size = run.impacts, np.zeros_like(run.impulse), np.abs(run.impulse)
-    np.add.at(total, table.step, table.impulse)
-    np.add.at(size, table.step, np.abs(table.impulse))
-    return _largest_share(np.abs(total - run.impulse).sum(axis=1), size.sum(axis=1))
 
 
 def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike,
@@ -290,28 +273,34 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
     ArgumentError
         A shape does not fit, or a number is not finite.
     """
-    judged = judge_gains(mass_matrix, v_minus, v_plus)
-    masses = np.asarray(mass_matrix, np.float64)
-    before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
-    masses = masses if masses.ndim == 3 else masses[None]
-    gains = np.flatnonzero(judged.gained)
-    first = int(gains[0]) if len(gains) else -1
-    largest = max((relative_gain(masses[k % len(masses)], before[k], after[k]) for k in gains), default=0.0)
-    momentum = np.nan
-    if impulse is not None and len(before):
-        recorded = np.atleast_2d(np.asarray(impulse, np.float64))
-        if recorded.shape != before.shape:
-            raise ArgumentError("impulse", recorded.shape, f"shape {before.shape}, as v_minus")
-        if not np.isfinite(recorded).all():
-            raise ArgumentError("impulse", "a number that is not finite", "finite numbers")
-        with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
-            change = after - before
-            size = np.matmul(np.abs(masses), np.abs(change)[:, :, None])[:, :, 0].sum(axis=1)
-            error = np.abs(np.matmul(masses, change[:, :, None])[:, :, 0] - recorded).sum(axis=1)
-        momentum = _largest_share(error, size + np.abs(recorded).sum(axis=1))
-    shown = "" if first < 0 else _shown(masses[first % len(masses)], before[first], after[first])
-    return Certificate(len(before), len(gains), judged.by_integers, judged.checked, first, largest, momentum, np.nan,
-                       np.nan, shown)
+    return _certificate([(mass_matrix, v_minus, v_plus, impulse)])
+
+
+def _certificate(batches: Iterable[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike | None]], span: float = np.nan,
+                 restitution: float = np.nan, total: float = np.nan, restitution_judged: bool = False) -> Certificate:
+    """Judge impacts in batches of M, v⁻, v⁺ and impulse, and join what else is known of them."""
+    judged, largest, momentum, first, shown = [Judged(np.zeros(0, np.bool_), 0, 0)], 0.0, np.nan, -1, ""
+    for mass_matrix, v_minus, v_plus, impulse in batches:
+        masses, before, after = _impacts(mass_matrix, v_minus, v_plus)
+        done = sum(len(one.gained) for one in judged)
+        judged.append(judge_gains(masses, before, after))
+        for k in np.flatnonzero(judged[-1].gained).tolist():
+            one = masses[k % len(masses)], before[k], after[k]
+            largest = max(largest, relative_gain(*one))
+            first, shown = (first, shown) if first >= 0 else (done + k, _shown(*one))
+        if impulse is not None and len(before):
+            recorded = _finite("impulse", np.atleast_2d(np.asarray(impulse, np.float64)))
+            if recorded.shape != before.shape:
+                raise ArgumentError("impulse", recorded.shape, f"shape {before.shape}, as v_minus")
+            with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
+                change = (after - before)[:, :, None]
+                size = np.matmul(np.abs(masses), np.abs(change))[:, :, 0].sum(axis=1) + np.abs(recorded).sum(axis=1)
+                error = np.abs(np.matmul(masses, change)[:, :, 0] - recorded).sum(axis=1)
+            momentum = np.fmax(momentum, _largest_share(error, size))
+    gained = np.concatenate([one.gained for one in judged])
+    return Certificate(len(gained), int(gained.sum()), sum(one.by_integers for one in judged),
+                       sum(one.checked for one in judged), first, largest, float(momentum), span, restitution, shown,
+                       total, restitution_judged)
 
 
 def _largest_share(error: Floats, size: Floats) -> float:
@@ -335,26 +324,14 @@ def relative_gain(mass: ArrayLike, before: ArrayLike, after: ArrayLike) -> float
 def _shown(mass: Floats, before: Floats, after: Floats) -> str:
     """Return Python source that computes the energy gain with rationals alone."""
     return f"""from fractions import Fraction
-M = {[[float(x) for x in row] for row in mass]!r}
-v_minus = {[float(x) for x in before]!r}
-v_plus = {[float(x) for x in after]!r}
+M = {mass.tolist()!r}
+v_minus = {before.tolist()!r}
+v_plus = {after.tolist()!r}
 def twice_energy(v):
     v = [Fraction(x) for x in v]
     return sum(Fraction(m) * v[i] * v[j] for i, row in enumerate(M) for j, m in enumerate(row))
 print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gained energy
 """
-
-
-def _joined(parts: list[Certificate]) -> Certificate:
-    """Join the certificates of all batches, given in order, into one."""
-    first, counterexample, before = -1, "", 0
-    for part in parts:
-        if first < 0 <= part.first_gain:
-            first, counterexample = before + part.first_gain, part.counterexample
-        before += part.impacts
-    return Certificate(
-        before, sum(p.gains for p in parts), sum(p.by_integers for p in parts), sum(p.checked for p in parts), first,
-        max(p.largest_gain for p in parts), max(p.momentum for p in parts), np.nan, np.nan, counterexample)
 
 
 def _contacts(run: Run, scene: Scene, mechanism: Mechanism) -> tuple[float, float]:

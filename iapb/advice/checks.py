@@ -95,11 +95,11 @@ class Start:
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
-        self.mechanism, self.shapes = mechanism_of(scene), shapes_of(scene)
-        self.pairs, (self.q, self.v) = pairs_of(scene, self.shapes), start_of(scene)
-        self.stops, solids = stops_of(scene, self.mechanism), solids_of(self.shapes)
+        self.mechanism, self.shapes, (self.q, self.v) = mechanism_of(scene), shapes_of(scene), start_of(scene)
+        self.pairs, self.stops = pairs_of(scene, self.shapes), stops_of(scene, self.mechanism)
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [wall.name for wall in scene.walls]
+        solids, mass, trees = solids_of(self.shapes), self.mechanism.mass_matrix(self.q), self.mechanism.tree_of_body
         size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
         for stop in self.stops:
             body = scene.bodies[stop.body]
@@ -107,15 +107,20 @@ class Start:
             size.append(stop.arm * float(np.ptp(body.joint_limits or (0.0,))))
         self.kind, self.radius = (np.append(each, np.full(len(self.stops), -1))
                                   for each in (self.shapes.kind, self.shapes.radius))
-        self.size, self.found = np.array(size), self._contacts(size[: len(size) - len(self.stops)])
-        trees, (a, b) = self.mechanism.tree_of_body, (self.found.body_a, self.found.body_b)
-        self.tree_a, self.tree_b = trees[a], trees[np.where(b < 0, a, b)]  # at a wall the same
-        self.rows = self.rows_along(np.arange(len(self.found.gap)), self.found.normal)
+        # contacts: trees (at a wall twice the same), Jacobian rows J (c, d), friction, thickness of the thinner
+        self.found = found = self._contacts(size[: len(size) - len(self.stops)])
+        self.tree_a, self.tree_b = trees[found.body_a], trees[np.where(found.body_b < 0, found.body_a, found.body_b)]
+        self.rows = self.rows_along(np.arange(len(found.gap)), found.normal)
         for row, stop in zip(self.rows[len(self.rows) - len(self.stops) :], self.stops, strict=True):
             row[self.mechanism.arrays.v_start[stop.body]] = stop.arm * stop.sign
         classes, table = frictions_of(scene)
-        self.friction = table[classes[self.found.shape_a], classes[self.found.shape_b]]
-        self.thickness = np.minimum(self.size[self.found.shape_a], self.size[self.found.shape_b])
+        self.friction = table[classes[found.shape_a], classes[found.shape_b]]
+        self.thickness = np.minimum(*np.array(size)[np.stack([found.shape_a, found.shape_b])])
+        # dofs and inverse mass matrix of each tree; acceleration (d,) and pull on each gap (c,) by gravity and the hand
+        ranges = [slice(*dofs) for dofs in self.mechanism.tree_dofs if dofs[1] > dofs[0]]
+        self.blocks = [(part, np.asarray(np.linalg.inv(mass[part, part]), np.float64)) for part in ranges]
+        self.size, self.fall = np.array(size), self.moved(self.applied(self.q)[None])[:, 0]
+        self.pull = self.rows @ self.fall
 
     def _contacts(self, sizes: list[float]) -> ContactBuffer:
         """Return the contacts between the closest features of each pair, near or far, and those of joint limits."""
@@ -146,13 +151,6 @@ class Start:
         across = frame_along("normal", n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
         return self.rows_along(np.full(len(across), i), across)
 
-    @cached_property
-    def blocks(self) -> list[tuple[slice, Floats]]:
-        """Dofs and inverse mass matrix of each tree."""
-        mass = self.mechanism.mass_matrix(self.q)
-        ranges = [slice(*dofs) for dofs in self.mechanism.tree_dofs if dofs[1] > dofs[0]]
-        return [(part, np.asarray(np.linalg.inv(mass[part, part]), np.float64)) for part in ranges]
-
     def moved(self, rows: Floats) -> Floats:
         """M⁻¹ Jᵀ (d, c) of rows J (c, d)."""
         out = np.zeros(rows.T.shape)
@@ -176,16 +174,6 @@ class Start:
             force += wrench[:3] @ self.mechanism.point_jacobian(q, body, point)
             force += wrench[3:] @ self.mechanism.frame_jacobian(q, body)[3:]
         return force
-
-    @cached_property
-    def fall(self) -> Floats:
-        """Acceleration (d,) at the start by gravity and the hand, without contacts and without motion."""
-        return self.moved(self.applied(self.q)[None])[:, 0]
-
-    @cached_property
-    def pull(self) -> Floats:
-        """Acceleration (c,) of each gap [m/s²] by gravity and the hand."""
-        return self.rows @ self.fall
 
     @cached_property
     def meeting(self) -> tuple[Floats, Floats]:
@@ -253,14 +241,6 @@ class Start:
         hand = self.scene.hand.largest_force() if self.scene.hand is not None else 0.0
         weights = float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies)
         return np.clip(force, 0.0, weights + hand)  # wedges and levers can give more, but less in other poses
-
-    @cached_property
-    def resting(self) -> Floats:
-        """Normal forces (c,) [N] that would hold the start in equilibrium; 0 at contacts that do not touch."""
-        force = np.zeros(len(self.rows))
-        for rows in self.touching:
-            force[rows] = self.loads(rows)
-        return force
 
     def names(self, rows: Iterable[int]) -> str:
         """Return the names of the things in contact, such as "box and floor"; of more than two, the first three."""
@@ -356,11 +336,13 @@ def _degrees(scene: Scene) -> Iterator[Caution]:
 
 def _overlaps(start: Start) -> Iterator[Caution]:
     """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the shape."""
-    found, sides = start.found, dict[int, list[int]]()
+    found, sides, resting = start.found, dict[int, list[int]](), np.zeros(len(start.rows))
+    for rows in start.touching:
+        resting[rows] = start.loads(rows)
     for rows in start.by_pair:
         i = int(rows[0])
         depth, (a, b) = -float(found.gap[i]), (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
-        if depth <= 0.0 or not _too_deep(start, rows):
+        if depth <= 0.0 or not _too_deep(start, rows, float(resting[rows].max())):
             continue
         if found.body_b[i] < 0:
             sides.setdefault(int(found.body_a[i]), []).append(i)
@@ -384,11 +366,11 @@ def _overlaps(start: Start) -> Iterator[Caution]:
                               f"make {a} smaller")
 
 
-def _too_deep(start: Start, rows: Rows) -> bool:
-    """Whether a pair starts deeper than at rest, judged by its depth and by the energy of its springs."""
+def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
+    """Whether a pair starts deeper than at rest, under a load [N], judged by its depth and its springs' energy."""
     gap, J = np.minimum(start.found.gap[rows], 0.0), start.rows[rows]
     depth, size, K = -float(gap.min()), float(start.thickness[rows[0]]), start.scene.contact.stiffness
-    if depth * K <= 2.0 * float(start.resting[rows].max()):
+    if depth * K <= 2.0 * resting:
         return False
     mass = 1.0 / max(float(np.max(np.sum(J * start.moved(J).T, axis=1))), 1e-300)
     kinetic, weight = 0.5 * mass * np.abs(J @ start.v).max() ** 2, mass * np.abs(start.pull[rows]).max()
@@ -499,21 +481,16 @@ def _overdriven_friction(start: Start) -> Iterator[Caution]:
                       f"{_up(contact.friction_velocity * worst / 2.0):g}, or contact.friction_law: coulomb")
 
 
-def _down(x: float) -> float:
-    """Return x rounded down to two digits."""
-    return _two_digits(x, math.floor, 1.0 + ROUNDED)
-
-
-def _up(x: float) -> float:
+def _up(x: float, way: Callable[[float], int] = math.ceil, slack: float = 1.0 - ROUNDED) -> float:
     """Return x rounded up to two digits."""
-    return _two_digits(x, math.ceil, 1.0 - ROUNDED)
-
-
-def _two_digits(x: float, way: Callable[[float], int], slack: float) -> float:
     if not (0.0 < x < math.inf):
         return x
     power = math.floor(math.log10(x)) - 1
     return float(f"{way(x * slack / 10.0**power)}e{power}")
+
+
+def _down(x: float) -> float:
+    return _up(x, math.floor, 1.0 + ROUNDED)
 
 
 # What `contact.auto` and `contact.forces: implicit` choose

@@ -15,20 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.advice.checks import settled
+from iapb.contact import laws
 from iapb.contact.geometry import Shapes
-from iapb.contact.laws import (
-    CLUSTERS,
-    ENGINE_LAWS,
-    EVERYTHING,
-    FRICTION,
-    IMPACT_FRICTION,
-    IMPULSES,
-    JOINTS,
-    NEWNESS,
-    OWN_RESTITUTION,
-    PENALTY,
-    ContactLaw,
-)
 from iapb.haptics.coupling import Coupling
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene
@@ -111,7 +99,7 @@ class Question:
 
     def no_contact(self) -> str:
         """Return why nothing can touch; empty if shapes, or joints with limits that the law keeps, can."""
-        stops = JOINTS in self.uses and any(body.joint_limits is not None for body in self.scene.bodies)
+        stops = laws.JOINTS in self.uses and any(body.joint_limits is not None for body in self.scene.bodies)
         return "" if any(self.facts[1:4]) or stops else "nothing can touch: the scene has no pair of shapes"
 
     def no_device(self) -> str:
@@ -193,7 +181,7 @@ def _joints(what: str, unit: str, left_out: str) -> Rule:
         return [f"{name} {numbers(x)}" for name, x in values if x is not None and (what == "limits" or any(x))]
 
     return Rule(lambda q: f"{field}: {', '.join(given(q)[:3])}{' …' if len(given(q)) > 3 else ''} {unit}", left_out,
-                parts=(JOINTS,), absent=lambda q: "" if given(q) else f"no joint has {what}", ignores=field)
+                parts=(laws.JOINTS,), absent=lambda q: "" if given(q) else f"no joint has {what}", ignores=field)
 
 
 def _by_pair(q: Question, field: str) -> str:
@@ -225,12 +213,6 @@ def _device(field: str, unit: str, left_out: str) -> Rule:
     return Rule(lambda q: f"device.{field} = {numbers(getattr(q.device, field))} {unit}", left_out,
                 lambda q: "" if any(getattr(q.device, field) or ()) else f"the scene gives no device.{field}",
                 absent=Question.no_device)
-
-
-def _no_limits(q: Question) -> str:
-    if q.device.force_limit is None:
-        return "the scene gives no device.force_limit"
-    return "the rendering 'full' ignores the limits" if q.rendering == "full" else ""
 
 
 def _one_step(q: Question) -> str:
@@ -279,30 +261,32 @@ EFFECTS: dict[str, Rule] = {
     "impulses": Rule(lambda q: f"new contacts collide: {_by_pair(q, 'restitution')}",
                      "bodies would be stopped by springs alone and sink in further",
                      lambda q: f"{_by_pair(q, 'restitution')}: an impulse would be zero"
-                     if q.facts.restitutions[-1] == -1.0 else "", (IMPULSES, OWN_RESTITUTION), ignores="restitution"),
+                     if q.facts.restitutions[-1] == -1.0 else "",
+                     (laws.IMPULSES, laws.OWN_RESTITUTION), ignores="restitution"),
     "unequal_restitution": Rule(
         lambda q: f"pairs that can touch differ: {_by_pair(q, 'restitution')}",
         "all contacts of a collision would bounce alike",
         lambda q: "" if len(q.facts.restitutions) > 1 else f"alike everywhere: {_by_pair(q, 'restitution')}",
-        (OWN_RESTITUTION,)),
+        (laws.OWN_RESTITUTION,)),
     "impact_friction": Rule(
         lambda q: _by_pair(q, "friction"), "bodies would bounce without losing tangential speed",
         lambda q: _smooth(q) or ("contact.self_collision_rows = per_body: rows of one body alone have no slip"
-                                 if q.scene.contact.self_collision_rows == "per_body" else ""), (IMPACT_FRICTION,)),
+                                 if q.scene.contact.self_collision_rows == "per_body" else ""),
+        (laws.IMPACT_FRICTION,)),
     # resting contacts: K and B of (5), friction by Coulomb's law or by (6)
     "penalty_stiffness": _contact(
-        "stiffness", "N/m", PENALTY, "nothing would hold a body that rests on another",
+        "stiffness", "N/m", laws.PENALTY, "nothing would hold a body that rests on another",
         lambda q: (", implicit" if q.scene.contact.forces == "implicit" else ", explicit (5)")
         + ": chosen for small sags" * ("stiffness" in q.scene.contact.chosen), "stiffness"),
     "contact_damping": _contact(
-        "damping", "N s/m", PENALTY, "resting contacts would swing on their springs",
+        "damping", "N s/m", laws.PENALTY, "resting contacts would swing on their springs",
         lambda q: ": chosen so that overlaps fade in 0.1 s" * ("damping" in q.scene.contact.chosen), "damping"),
     "friction": Rule(lambda q: _by_pair(q, "friction"), "bodies would slide along each other without loss", _smooth,
-                     (FRICTION,), ignores="friction"),
+                     (laws.FRICTION,), ignores="friction"),
     # section III: contacts close together count as one; a contact near one of the step before is not new
-    "clustering": _contact("cluster_distance", "m", CLUSTERS,
+    "clustering": _contact("cluster_distance", "m", laws.CLUSTERS,
                            "contacts that a fine mesh repeats would count several times"),
-    "coherence": _contact("coherence_distance", "m", NEWNESS,
+    "coherence": _contact("coherence_distance", "m", laws.NEWNESS,
                           "contacts that move from facet to facet would collide again"),
     # section VI: coupling and device
     "coupling": Rule(lambda q: f"{q.coupling or 'a coupling'} holds tool and device together, "
@@ -311,7 +295,9 @@ EFFECTS: dict[str, Rule] = {
     "device_limits": Rule(
         lambda q: f"device.force_limit = {numbers(q.device.force_limit)} N, N m"
         + (f", rendering '{q.rendering}'" if q.rendering else ""),
-        "the hand would feel impulses that no motor can give", _no_limits,
+        "the hand would feel impulses that no motor can give",
+        lambda q: "the scene gives no device.force_limit" if q.device.force_limit is None
+        else "the rendering 'full' ignores the limits" if q.rendering == "full" else "",
         absent=lambda q: "" if q.rendering in ("scale", "spread") else q.no_device()),  # they scale the tool's impulse
     "delay": Rule(lambda q: f"device.delay = {q.device.delay} steps, {1e3 * q.device.delay * q.scene.step:g} ms",
                   "the coupling would look more stable than over a real line",
@@ -322,7 +308,7 @@ EFFECTS: dict[str, Rule] = {
                               "the device would be a pure inertia, the worst case for stability"),
     "waveform": Rule(
         lambda q: f"device.waveform = {q.device.waveform}: an impulse is given over many steps, watched by the "
-        "observer", "the hand would get each impulse as a blow of one step", _one_step, (IMPULSES,),
+        "observer", "the hand would get each impulse as a blow of one step", _one_step, (laws.IMPULSES,),
         lambda q: q.no_device() or q.no_contact()),
 }
 
@@ -330,7 +316,7 @@ EFFECT_NAMES = tuple(EFFECTS)
 
 
 def decide_effects(
-    scene: Scene, law: ContactLaw | str | None = None, coupling: Coupling | str | None = None,
+    scene: Scene, law: laws.ContactLaw | str | None = None, coupling: Coupling | str | None = None,
     rendering: str | None = None,
 ) -> tuple[Effect, ...]:
     """Decide which effects are on for a scene and for the caller's choices.
@@ -368,15 +354,15 @@ def count_pairs(mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32]) 
 
 
 def decide_for(
-    scene: Scene, facts: Facts, law: ContactLaw | str | None, coupling: Coupling | str | None,
+    scene: Scene, facts: Facts, law: laws.ContactLaw | str | None, coupling: Coupling | str | None,
     rendering: str | None = None,
 ) -> tuple[Effect, ...]:
     """Do what `decide_effects` does for a settled scene with known facts."""
     if law is not None and not isinstance(law, str):
         law = law.within(scene) if hasattr(law, "within") else law
         rendering = getattr(law, "rendering", "full") if rendering is None else rendering
-    known = ENGINE_LAWS.get(law) if isinstance(law, str) else law
-    uses = EVERYTHING | {JOINTS} if known is None else getattr(known, "uses", EVERYTHING)
+    known = laws.ENGINE_LAWS.get(law) if isinstance(law, str) else law
+    uses = laws.EVERYTHING | {laws.JOINTS} if known is None else getattr(known, "uses", laws.EVERYTHING)
     names = (one if one is None or isinstance(one, str) else one.name for one in (law, coupling))
     q = Question(scene, facts, next(names), uses, next(names), coupling if hasattr(coupling, "stiffness") else None,
                  law is None or isinstance(law, str) or getattr(law, "impulses", False), rendering)

@@ -1,7 +1,8 @@
-"""Distrust by tree, by spin and by passage: faults planted in sound records, and bodies that pass within a step."""
+"""Distrust: nothing is said of sound runs, and each reason of what is planted in one, or of what passes through."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +16,7 @@ from iapb.simulation import simulate
 
 BALL = {"kind": "sphere", "radius": 0.005}
 DISC = {"kind": "circle", "radius": 0.005}
+SIDE = 0.1
 CUBE, SQUARE = {"kind": "box", "size": [0.01] * 3}, {"kind": "box", "size": [0.01] * 2}
 
 
@@ -30,6 +32,43 @@ def run_of(*bodies: Any, walls: Any = (), steps: int = 6, **given: Any) -> Run:
     kind, more = (Scene, {}) if bodies[0]["joint"] == "planar" else (SpatialScene, {"dimensions": 3})
     scene = {"name": "made", "rate": 1000.0, "duration": 1.0, "bodies": list(bodies), "walls": list(walls)}
     return simulate(kind.model_validate(scene | more | given), steps=steps)
+
+
+def fallen(height: float = 0.01, **values: Any) -> Run:
+    """A box that falls on a floor."""
+    crate = body("box", {"kind": "box", "size": [SIDE, SIDE]}, [0, 0.5 * SIDE + height], [], mass=1.0)
+    floor = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
+    return run_of(crate, walls=[floor], steps=100, gravity=[0, -9.81], contact={"forces": "paper"} | values)
+
+
+def test_a_run_that_gains_energy_says_so_wherever_it_is_shown() -> None:
+    run = fallen(0.05, stiffness=1e9)
+    assert "above start and work" in run.distrust[0]
+    assert "not to be trusted" in repr(run) and "Not to be trusted" in run._repr_html_()
+
+
+def test_each_reason_is_found_in_the_arrays_of_a_sound_run() -> None:
+    run = fallen(stiffness=1e4)
+    assert run.distrust == distrust_of(run) == () and len(repr(run)) < 160
+    rising, far, lost = np.linspace(0.0, 1.0, 101), run.q.copy(), run.q.copy()
+    far[-1, 0], lost[-1, 0] = 1e3, np.nan
+    for planted, why in (
+            (replace(run, energy=run.energy | {"kinetic": run.energy["kinetic"] + rising}), "above start"),
+            (replace(run, energy=run.energy | {"friction_work": rising[1:]}), "friction drove"),
+            (replace(run, contacts=replace(run.contacts, gap=run.contacts.gap - 0.51 * SIDE)), "half of 100 mm"),
+            (replace(run, q=far), "can be explained"), (replace(run, q=lost), "not finite")):
+        assert why in distrust_of(planted)[0]
+
+
+def test_a_joint_beyond_its_limit_is_seen() -> None:
+    door = body("door", SQUARE, [0, 0], []) | {"joint": "prismatic", "axis": [1, 0], "position": [0.0],
+                                               "velocity": [0.0], "joint_limits": [-0.1, 0.1], "inertia": 1.0}
+    run = run_of(door, steps=20)
+    for beyond, when, seen in ((0.021, -1, True), (0.019, -1, False), (0.101, 5, True), (0.099, 5, False)):
+        q = run.q.copy()
+        q[when, 0] = 0.1 + beyond
+        assert run.distrust == () and any("beyond its limits -0.1 and 0.1" in why for why in distrust_of(
+            replace(run, q=q))) == seen
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +159,20 @@ PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
 }
 
 
+for turned in (0.0, 0.5, -2.0):  # a ball 10 mm beside its body, 40 mm in a step, through a plate or past its end
+    c, s = math.cos(turned), math.sin(turned)
+    for kind, form in (("box", {"size": [0.2, 0.004]}), ("polygon", {
+            "vertices": [[-0.1, -0.002], [0.1, -0.002], [0.1, 0.002], [-0.1, 0.002]]})):
+        for along, said in ((0.05, "ball passes through plate in the step to 0.003 s"), (0.12, "")):
+            start = [0.3 + c * along - s * 0.1 - 0.01, 0.2 + s * along + c * 0.1]
+            PASSAGES[f"ball, {kind} turned by {turned}, {along} from its middle"] = (
+                [body("ball", DISC | {"center": [0.01, 0]}, start, [40.0 * s, -40.0 * c])],
+                [{"name": "plate", "kind": kind, "center": [0.3, 0.2], "angle": turned, **form}], said)
+PASSAGES["upside down in space"] = (
+    [body("ball", BALL | {"center": [0, 0, 0.03]}, [0, 0, 0], [0, 0, 40.0]) | {"position": [0, 0, 0.13, 1, 0, 0, 0]}],
+    plate(0.2, 0.2, 0.004, rpy=[0.2, 0.1, 0.3]), "ball passes through plate")
+
+
 @pytest.mark.parametrize("name", PASSAGES)
 def test_a_body_that_passes_through_another_within_a_step_is_seen(name: str) -> None:
     bodies, walls, said = PASSAGES[name]
@@ -133,3 +186,23 @@ def test_a_wall_that_is_wholly_inside_a_body_is_seen() -> None:
     (found,) = run_of(block, walls=[post], steps=1).distrust
     assert found == "block and a wall overlap by 5.5 mm at 0 s, all of 4 mm"
     assert run_of(body("block", block["shapes"][0], [0, 0.0485], []), walls=[post], steps=1).distrust == ()
+
+
+@pytest.mark.parametrize(("shape", "wide", "friction", "said"), [
+    ({"kind": "circle", "radius": 0.035}, 0.06, 0.0, "10 mm narrower"),
+    ({"kind": "circle", "radius": 0.0301}, 0.06, 0.0, ""),
+    ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.0, "40 mm narrower"),
+    ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.5, ""),  # friction holds it there
+    ({"kind": "box", "size": [SIDE, SIDE]}, 0.095, 0.0, ""),
+    ({"kind": "box", "size": [SIDE, SIDE]}, 0.11, 0.0, ""),
+])
+def test_what_falls_through_a_gap_too_narrow_for_it_is_seen(
+        shape: dict[str, Any], wide: float, friction: float, said: str) -> None:
+    walls = [{"name": name, "kind": "box", "size": [0.5, 1.0], "center": [side * (0.25 + 0.5 * wide), 0.0]}
+             for name, side in (("left", -1.0), ("right", 1.0))]
+    thing = body("thing", shape, [0, 0], [], mass=1.0) | {"inertia": SIDE**2 / 6.0}
+    run = run_of(thing, walls=walls, steps=500, gravity=[0, -9.81],
+                 contact={"forces": "paper", "stiffness": 1e4, "damping": 50.0, "friction": friction})
+    assert (run.q[-1, 1] < -SIDE) == (friction == 0.0)
+    assert [why for why in run.distrust if "narrower" in why and said not in why] == []
+    assert any("narrower" in why for why in run.distrust) == bool(said)

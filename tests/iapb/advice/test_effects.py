@@ -63,89 +63,67 @@ def effect(scene: Scene, name: str, *choices: Any) -> Effect:
     return next(found for found in decide_effects(scene, *choices) if found.name == name)
 
 
-def test_every_effect_is_switched_below() -> None:
-    assert [found.name for found in decide_effects(PEG)] == list(SWITCHES)
-    assert len(EFFECTS) == len(SWITCHES)
+def test_every_effect_is_switched_above() -> None:
+    assert [found.name for found in decide_effects(PEG)] == [*EFFECTS] == list(SWITCHES)
 
 
 @pytest.mark.parametrize("name", SWITCHES)
 def test_a_scene_alone_switches_the_effect_and_the_reason_has_its_values(name: str) -> None:
     scene, on, off, values = SWITCHES[name]
     switched_on, switched_off = effect(scene.with_values(on), name), effect(scene.with_values(off), name)
-    assert switched_on.active
-    assert values in switched_on.reason
-    assert not switched_off.active
-    assert switched_off.reason != switched_on.reason
-    assert switched_on.left_out
+    assert switched_on.active and not switched_off.active and switched_on.left_out
+    assert values in switched_on.reason and switched_off.reason != switched_on.reason
 
 
-@pytest.mark.parametrize("law", [Penalty(), RigidConstraints()])
-def test_laws_without_impulses_switch_them_off_and_are_named(law: Any) -> None:
-    found = effect(PEG, "impulses", law)
-    assert not found.active
-    assert law.name in found.reason
+RIGID, RUBBING = RigidConstraints(), "impulse-augmented penalty with impact friction"
+ROUGH, BARE = PEG.with_values({"contact.friction": 0.3}), PEG.with_values({"couplings": {}})
+PER_BODY = ROUGH.with_values({"contact.self_collision_rows": "per_body"})
+GAINS = FourChannel((5.0, 6.0, 7.0), (1.0, 1.0, 1.0))
+SLIDER = [{"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1}]
+
+# effect, scene, law, coupling and rendering, whether it is on, what the reason says, field that the law ignores
+CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
+    ("impulses", PEG, (Penalty(),), False, "'penalty' does not use it", "restitution"),
+    ("impulses", PEG, (RIGID,), False, f"'{RIGID.name}' does not use it", ""),
+    *((name, ROUGH, (law,), on, "contact." if on else RIGID.name, "" if on else field)
+      for name, field in (("penalty_stiffness", "stiffness"), ("contact_damping", "damping"), ("friction", "friction"))
+      for law, on in (("penalty", True), (RIGID, False))),
+    ("friction", PEG.with_values({"contact.friction": 0.0}), (RIGID,), False, RIGID.name, ""),
+    ("impact_friction", ROUGH, (RUBBING,), True, "0.3", ""),
+    ("impact_friction", ROUGH, ("impulse-augmented penalty",), False, "does not use it", ""),
+    ("impact_friction", PER_BODY, (RUBBING,), False, "per_body", ""),
+    *((name, PEG, (None, "none"), False, "no coupling", "")
+      for name in ("coupling", "device_limits", "delay", "quantisation", "device_damping", "waveform")),
+    ("coupling", PEG.with_values({"couplings.unilateral": None}), (None, "four-channel"), True, "four-channel", ""),
+    ("coupling", PEG.with_values({"couplings.unilateral": None}), (None, "unilateral"), False,
+     "couplings.unilateral", ""),
+    ("coupling", BARE, (None, "four-channel"), False, "couplings.four_channel", ""),
+    ("coupling", BARE, (None, GAINS), True, "[5, 6, 7]", ""),
+    ("device_limits", PEG, (None, "four-channel", "full"), False, "'full'", ""),
+    ("device_limits", PEG, (None, "four-channel", "scale"), True, "'scale'", ""),
+    ("device_limits", PEG, (None, "none", "scale"), True, "[15, 15, 1]", ""),  # the tool's impulse is scaled as well
+    ("gravity", PENDULUM.with_values({f"bodies.{link}.mass": 0 for link in ("upper", "lower")}), (), False, "mass", ""),
+    ("gravity", PENDULUM.with_values({"bodies": SLIDER}), (), False, "nothing moves along gravity = [0, -9.81]", ""),
+]
 
 
-def test_rigid_constraints_use_no_penalty_and_no_friction() -> None:
-    rough = PEG.with_values({"contact.friction": 0.3})
-    for name in ("penalty_stiffness", "contact_damping", "friction"):
-        assert effect(rough, name, "penalty").active
-        assert not effect(rough, name, RigidConstraints()).active
+@pytest.mark.parametrize(("name", "scene", "choices", "on", "reason", "ignores"), CHOSEN)
+def test_the_choices_of_the_caller_switch_the_effect(
+        name: str, scene: Scene, choices: tuple[Any, ...], on: bool, reason: str, ignores: str) -> None:
+    found = effect(scene, name, *choices)
+    assert (found.active, found.ignores) == (on, ignores) and reason in found.reason
 
 
-def test_friction_in_impacts_is_on_where_the_law_asks_and_a_contact_can_slip() -> None:
-    rough = PEG.with_values({"contact.friction": 0.3})
-    asking = "impulse-augmented penalty with impact friction"
-    assert effect(rough, "impact_friction", asking).active
-    assert not effect(rough, "impact_friction", "impulse-augmented penalty").active
-    per_body = rough.with_values({"contact.self_collision_rows": "per_body"})
-    assert "per_body" in effect(per_body, "impact_friction", asking).reason
-    assert not effect(per_body, "impact_friction", asking).active
+def test_gravity_names_what_would_not_fall() -> None:
+    lift = {"name": "lift", "joint": "prismatic", "axis": [0, 1], "mass": 1}
+    assert effect(PENDULUM.with_values({"bodies": [*SLIDER, lift]}), "gravity").left_out.startswith("lift would")
 
 
-def test_a_law_of_the_callers_own_is_taken_to_use_all() -> None:
+def test_laws_and_couplings_are_known_by_name_and_an_unknown_law_uses_all() -> None:
     assert decide_effects(PEG, "my law") == decide_effects(PEG)
-
-
-@pytest.mark.parametrize("name", ["coupling", "device_limits", "delay", "quantisation", "device_damping"])
-def test_without_a_coupling_no_device_takes_part(name: str) -> None:
-    assert not effect(PEG, name, None, "none").active
-    assert "coupling" in effect(PEG, name, None, "none").reason
-
-
-def test_a_coupling_without_gains_is_off_and_says_which_are_missing() -> None:
-    scene = PEG.with_values({"couplings.unilateral": None})
-    assert effect(scene, "coupling", None, "four-channel").active
-    found = effect(scene, "coupling", None, "unilateral")
-    assert not found.active
-    assert "couplings.unilateral" in found.reason
-
-
-def test_full_rendering_ignores_the_limits() -> None:
-    assert not effect(PEG, "device_limits", None, "four-channel", "full").active
-    assert "scale" in effect(PEG, "device_limits", None, "four-channel", "scale").reason
-
-
-def test_gravity_needs_mass() -> None:
-    weightless = {f"bodies.{link}.mass": 0 for link in ("upper", "lower")}
-    assert not effect(PENDULUM.with_values(weightless), "gravity").active
-
-
-def test_gravity_needs_something_that_moves_along_it() -> None:
-    slider = {"bodies": [{"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1}]}
-    across = effect(PENDULUM.with_values(slider), "gravity")
-    assert not across.active
-    assert across.reason == "nothing moves along gravity = [0, -9.81] m/s2"
-    both = slider["bodies"] + [{"name": "lift", "joint": "prismatic", "axis": [0, 1], "mass": 1}]
-    assert effect(PENDULUM.with_values({"bodies": both}), "gravity").left_out == "lift would not fall or sag"
-
-
-def test_a_coupling_with_gains_of_its_own_needs_none_of_the_scene() -> None:
-    bare = PEG.with_values({"couplings": {}})
-    assert not effect(bare, "coupling", None, "four-channel").active
-    found = effect(bare, "coupling", None, FourChannel((5.0, 6.0, 7.0), (1.0, 1.0, 1.0)))
-    assert found.active
-    assert "[5, 6, 7]" in found.reason
+    for law in (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty()):
+        assert decide_effects(PEG, law.name, None, "full") == decide_effects(PEG, law)
+    assert {coupling.name for coupling in (FourChannel, UnilateralCoupler)} == set(COUPLING_FIELDS)
 
 
 def test_the_record_and_the_switches_are_one_decision() -> None:
@@ -180,20 +158,7 @@ def test_every_scene_gets_a_reason_for_every_effect(name: str) -> None:
         assert "None" not in found.reason
 
 
-@given(
-    st.sampled_from(["stiffness", "damping", "friction", "cluster_distance", "coherence_distance"]),
-    st.floats(0.0, 1e6),
-)
-def test_a_number_of_the_contact_section_is_on_exactly_where_it_is_not_zero(field: str, value: float) -> None:
-    names = {"stiffness": "penalty_stiffness", "damping": "contact_damping", "cluster_distance": "clustering",
-             "coherence_distance": "coherence"}
-    assert effect(PEG.with_values({f"contact.{field}": value}), names.get(field, field)).active == (
-        value > 0.0
-    )
-
-
-def test_the_engines_laws_and_couplings_are_known_by_their_own_names() -> None:
-    laws = (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty())
-    for law in laws:
-        assert decide_effects(PEG, law.name, None, "full") == decide_effects(PEG, law)
-    assert {coupling.name for coupling in (FourChannel, UnilateralCoupler)} == set(COUPLING_FIELDS)
+@given(st.sampled_from([("penalty_stiffness", "stiffness"), ("contact_damping", "damping"), ("friction", "friction"),
+                       ("clustering", "cluster_distance"), ("coherence", "coherence_distance")]), st.floats(0.0, 1e6))
+def test_a_number_of_the_contact_section_is_on_exactly_where_it_is_not_zero(one: tuple[str, str], value: float) -> None:
+    assert effect(PEG.with_values({f"contact.{one[1]}": value}), one[0]).active == (value > 0.0)
