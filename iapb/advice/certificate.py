@@ -163,13 +163,12 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
     masses, before, after = _impacts(mass_matrix, v_minus, v_plus)
     signs = np.empty(len(before), np.int64)
     gain_signs(masses, before, after, signs)
-    gained, unsure = signs > 0, np.flatnonzero(signs == 0)
-    for k in unsure:
-        gained[k] = exact_gain(masses[k % len(masses)], before[k], after[k]) > 0
-    checked = np.flatnonzero(signs != 0)[::_CHECKED]
-    for k in checked:
-        if gained[k] != (exact_gain(masses[k % len(masses)], before[k], after[k]) > 0):
+    gained, unsure, checked = signs > 0, np.flatnonzero(signs == 0), np.flatnonzero(signs)[::_CHECKED]
+    for k in (*unsure, *checked):
+        gains = exact_gain(masses[k % len(masses)], before[k], after[k]) > 0
+        if signs[k] and gains != gained[k]:
             raise IapbError(f"impact {k}: an error of iapb: the exact energy is outside its double-double bounds")
+        gained[k] = gains
     return Judged(gained, len(unsure), len(checked))
 
 
@@ -233,10 +232,9 @@ def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, F
 
 def exported_run(run: Run) -> Iterator[str]:
     """Yield the impacts of a run as the lines of `exported`."""
-    if len(run.impacts.step):
-        mechanism = mechanism_of(scene_kind(run.scene_resolved).model_validate(run.scene_resolved))
-        for mass_matrix, v_minus, v_plus, _ in _batches(run, mechanism):
-            yield from exported(mass_matrix, v_minus, v_plus)
+    mechanism = mechanism_of(scene_kind(run.scene_resolved).model_validate(run.scene_resolved))
+    for mass_matrix, v_minus, v_plus, _ in _batches(run, mechanism):
+        yield from exported(mass_matrix, v_minus, v_plus)
 
 
 def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Iterator[str]:

@@ -99,7 +99,7 @@ class Start:
         self.pairs, self.stops = pairs_of(scene, self.shapes), stops_of(scene, self.mechanism)
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [wall.name for wall in scene.walls]
-        solids, mass, trees = solids_of(self.shapes), self.mechanism.mass_matrix(self.q), self.mechanism.tree_of_body
+        solids, trees = solids_of(self.shapes), self.mechanism.tree_of_body
         size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
         for stop in self.stops:
             body = scene.bodies[stop.body]
@@ -115,12 +115,8 @@ class Start:
             row[self.mechanism.arrays.v_start[stop.body]] = stop.arm * stop.sign
         classes, table = frictions_of(scene)
         self.friction = table[classes[found.shape_a], classes[found.shape_b]]
-        self.thickness = np.minimum(*np.array(size)[np.stack([found.shape_a, found.shape_b])])
-        # dofs and inverse mass matrix of each tree; acceleration (d,) and pull on each gap (c,) by gravity and the hand
-        ranges = [slice(*dofs) for dofs in self.mechanism.tree_dofs if dofs[1] > dofs[0]]
-        self.blocks = [(part, np.asarray(np.linalg.inv(mass[part, part]), np.float64)) for part in ranges]
-        self.size, self.fall = np.array(size), self.moved(self.applied(self.q)[None])[:, 0]
-        self.pull = self.rows @ self.fall
+        self.size = np.array(size)
+        self.thickness = np.minimum(self.size[found.shape_a], self.size[found.shape_b])
 
     def _contacts(self, sizes: list[float]) -> ContactBuffer:
         """Return the contacts between the closest features of each pair, near or far, and those of joint limits."""
@@ -151,6 +147,13 @@ class Start:
         across = frame_along("normal", n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
         return self.rows_along(np.full(len(across), i), across)
 
+    @cached_property
+    def blocks(self) -> list[tuple[slice, Floats]]:
+        """Dofs and inverse mass matrix of each tree."""
+        mass = self.mechanism.mass_matrix(self.q)
+        ranges = [slice(*dofs) for dofs in self.mechanism.tree_dofs if dofs[1] > dofs[0]]
+        return [(part, np.asarray(np.linalg.inv(mass[part, part]), np.float64)) for part in ranges]
+
     def moved(self, rows: Floats) -> Floats:
         """M⁻¹ Jᵀ (d, c) of rows J (c, d)."""
         out = np.zeros(rows.T.shape)
@@ -174,6 +177,16 @@ class Start:
             force += wrench[:3] @ self.mechanism.point_jacobian(q, body, point)
             force += wrench[3:] @ self.mechanism.frame_jacobian(q, body)[3:]
         return force
+
+    @cached_property
+    def fall(self) -> Floats:
+        """Acceleration (d,) by gravity and the hand at the start, without contacts and without motion."""
+        return self.moved(self.applied(self.q)[None])[:, 0]
+
+    @cached_property
+    def pull(self) -> Floats:
+        """Acceleration (c,) of each gap [m/s²] by gravity and the hand."""
+        return self.rows @ self.fall
 
     @cached_property
     def meeting(self) -> tuple[Floats, Floats]:

@@ -26,7 +26,7 @@ from iapb import (
 from iapb.advice.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
-from iapb.scene.reading import scene_from_text
+from iapb.scene import Scene
 
 
 def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -150,7 +150,7 @@ def test_a_run_of_the_engine_is_certified(name: str) -> None:
 
 # what is forged, and the residuals that fail; none of them gains energy but the first
 FORGED: dict[str, tuple[Callable[[Run], Run], set[str]]] = {
-    "faster": (lambda run: forged(run, "impacts.v_plus", 1.0 + 1e-9), {"gains", "momentum"}),
+    "faster": (lambda run: forged(run, "impacts.v_plus", 1.0 + 1e-8), {"gains", "momentum"}),
     "impulse of an impact": (lambda run: forged(run, "impacts.impulse", 1.0 + 1e-6), {"momentum", "total"}),
     "impulse of a step": (lambda run: forged(run, "impulse", 1.0 + 1e-6, run.impacts.step[0]), {"total", "span"}),
     "impulse of a contact": (lambda run: forged(run, "contacts.impulse", 1.0 + 1e-6,
@@ -196,21 +196,21 @@ def test_impacts_outside_the_run_are_refused(cradle: Run) -> None:
             certify(replace(cradle, impacts=beyond))
 
 
-def cradle_between_walls(balls: int, radius: float = 2.0**-6, gap: float = 2.0**-10) -> str:
-    """Discs on a line between two walls, elastic; the first moves. No force acts between collisions."""
-    places = [k * (2.0 * radius + gap) for k in range(balls)]
-    bodies = [f"{{name: ball_{k}, joint: prismatic, axis: [1, 0], mass: 1, position: [{x}], velocity: [{int(k == 0)}], "
-              f"shapes: [{{kind: circle, radius: {radius}}}]}}" for k, x in enumerate(places)]
-    walls = [f"{{name: wall_{k}, kind: half_plane, point: [{x}, 0], normal: [{n}, 0]}}" for k, x, n in
-             ((0, -radius - gap, 1), (1, places[-1] + radius + gap, -1))]
-    contact = "{stiffness: 0, damping: 0, restitution: 1, coherence_distance: 2e-3}"
-    return (f"name: cradle\nrate: 1000\nduration: 1\nbodies: [{', '.join(bodies)}]\n"
-            f"walls: [{', '.join(walls)}]\ncontact: {contact}\n")
+def test_energy_never_rises_between_two_impacts_of_the_record() -> None:
+    """Five discs between two walls, with no force between collisions.
 
-
-def test_energy_of_a_cradle_never_rises_between_two_impacts_of_the_record() -> None:
-    """With 1,210,000 steps, 1,008,333 collisions, it loses 5.4e-10 of its energy: 2.4 ε each (run once, by hand)."""
-    run = simulate(scene_from_text(cradle_between_walls(5), "cradle"), steps=3000)
+    With 1,210,000 steps, 1,008,333 collisions, it loses 5.4e-10 of its energy: 2.4 ε each (run once, by hand).
+    """
+    radius, gap = 2.0**-6, 2.0**-10
+    places = [k * (2.0 * radius + gap) for k in range(5)]
+    bodies = [{"name": f"ball_{k}", "joint": "prismatic", "axis": [1, 0], "mass": 1, "position": [x],
+               "velocity": [float(k == 0)], "shapes": [{"kind": "circle", "radius": radius}]}
+              for k, x in enumerate(places)]
+    walls = [{"name": f"wall_{n}", "kind": "half_plane", "point": [x, 0], "normal": [n, 0]}
+             for x, n in ((-radius - gap, 1), (places[-1] + radius + gap, -1))]
+    contact = {"stiffness": 0, "damping": 0, "restitution": 1, "coherence_distance": 2e-3}
+    run = simulate(Scene.model_validate({
+        "name": "cradle", "rate": 1000, "duration": 3, "bodies": bodies, "walls": walls, "contact": contact}))
     table = run.impacts
     assert certify(run).passed and len(table.step) > 2000 and not run.distrust
     np.testing.assert_array_equal(table.v_minus[1:], table.v_plus[:-1])  # free flight keeps every bit
