@@ -183,11 +183,12 @@ def test_auto_carries_a_stack_and_the_run_says_what_was_chosen() -> None:
 
 
 @pytest.mark.parametrize(("contact", "stiffness", "damping"), [
-    ({}, 10.0 * MASS * 9.81 / 1e-4, 9900.0), ({"stiffness": 2e4}, 2e4, 200.0), ({"auto": True}, 990000.0, 9900.0)])
+    ({}, 990000.0, 99000.0), ({"stiffness": 2e4}, 2e4, 2000.0), ({"auto": True}, 990000.0, 99000.0)])
 def test_implicit_contact_holds_ten_times_all_weight_at_a_tenth_of_a_millimetre(
         contact: dict[str, Any], stiffness: float, damping: float) -> None:
+    """10 m g over 0.1 mm, rounded up to two digits; an overlap fades in 0.1 s."""
     chosen, (said,) = settled(scene(box(), forces="implicit", **contact))
-    assert chosen.contact.stiffness == pytest.approx(stiffness, rel=0.02) and chosen.contact.damping == damping
+    assert (chosen.contact.stiffness, chosen.contact.damping) == (stiffness, damping)
     assert said.startswith("chosen for implicit contact") and "a load of 9.81 N sags" in said
 
 

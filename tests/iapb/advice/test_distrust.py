@@ -131,18 +131,18 @@ def plate(*size: float, center: Any = None, **values: Any) -> list[dict[str, Any
     return [{"name": "plate", "kind": "box", "size": size, "center": center or [0] * len(size), **values}]
 
 
-UP, DOWN = [0, 0.1], [0, -30.0]
+UP, HIGH, DOWN = [0, 0.1], [0, 0.105], [0, -30.0]
 PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
-    "box, plate": ([body("a", SQUARE, UP, DOWN)], plate(0.2, 0.01), "a passes through plate"),
+    "box, plate": ([body("a", SQUARE, HIGH, DOWN)], plate(0.2, 0.01), "a passes through plate"),
     "beside it": ([body("a", SQUARE, UP, DOWN)], plate(0.2, 0.01, center=[0.106, 0]), ""),
     "past its corner": ([body("a", DISC, [0.156, 0.041], [-31.0, -31.0])], plate(0.2, 0.01), ""),
-    "box, plate in space": ([body("a", CUBE, [0, 0, 0.1], [0, 0, -30.0])], plate(0.2, 0.2, 0.01),
+    "box, plate in space": ([body("a", CUBE, [0, 0, 0.105], [0, 0, -30.0])], plate(0.2, 0.2, 0.01),
                             "a passes through plate"),
     "polygon, polygon": (
         [body("a", {"kind": "polygon", "vertices": [[0, 0], [0.01, 0], [0, 0.01]]}, UP, DOWN)],
         [{"name": "plate", "kind": "polygon", "vertices": [[-0.1, -0.005], [0.1, -0.005], [0, 0.005]]}],
         "a passes through plate"),
-    "ends of two plates": ([body("a", {"kind": "box", "size": [0.1, 0.01]}, UP, DOWN)],
+    "ends of two plates": ([body("a", {"kind": "box", "size": [0.1, 0.01]}, HIGH, DOWN)],
                            plate(0.1, 0.01, center=[0.09, 0]), "a passes through plate"),
     "box, round post": ([body("a", {"kind": "box", "size": [0.02, 0.02]}, [0.004, 0.1], [0, -60.0])],
                         [{"name": "post", "kind": "circle", "radius": 0.004}], "a passes through post"),
