@@ -57,10 +57,6 @@ fuzz: setup ## faults done to the store, and 100,000 wrong inputs: each is read 
 	@$(BIN)/python -m tests.robustness.faults
 	@$(BIN)/python -m tests.robustness.fuzz --cases $(or $(CASES),100000)
 
-.PHONY: mutants
-mutants: setup ## sampled small faults in the physics: the share that the tests notice; N=100 SEED=0
-	@$(BIN)/python -m tools.mutants -n $(or $(N),100) --seed $(or $(SEED),0) --workers $(PYTEST_WORKERS)
-
 .PHONY: docs
 docs: setup ## the pages of docs/ with the reference of the code, as HTML in out/docs; a warning is an error
 	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/docs

