@@ -138,7 +138,7 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     e = _coefficients("restitution", restitution, c, "contact", -1.0)
     if not isinstance(method, str) or method not in METHODS:
         raise ArgumentError("method", method, one_of(method, METHODS))
-    one_for_all = method == "factored" and bool((e == e.flat[:1]).all())
+    one_for_all = method == "factored" and (e.ndim == 0 or bool((e == e[:1]).all()))
     options = _options(budget, clamp, rank_tolerance, one_for_all)
     if one_for_all:
         return _resolve(arrays, e.reshape(-1)[:1] if e.size else np.zeros(1), NEWTON, options)
@@ -232,20 +232,20 @@ def _resolve(arrays: Arrays, restitution: Floats, law: str,
     """Resolve n impacts in one compiled call; return the first, or all if there are many."""
     (n, c, d), (budget, clamped, tolerance) = arrays[1].shape, options
     out = Results(np.empty((n, d)), np.empty((n, d)), np.empty((n, c)), np.empty((n, c * directions)),
-                  np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty((n, 3)))
-    limit = d if budget is None else min(budget, np.iinfo(np.int64).max)
+                  np.empty((n, 2), np.int64), np.empty((n, 5)))
+    limit = d if budget is None else min(budget, d)
     done = _ENTRIES[law](*arrays, restitution, unequal, tangents, friction, tolerance, limit, clamped,
                          _scratch(d, c, directions), out)
     if done < n:
         raise diagnose(*arrays, out, done, many)
     along = out.tangential.reshape(n, c, directions)
     if many:
-        return Impact(*out[:3], out.rank, out.energy[:, 0], out.energy[:, 1:], out.clamp,
-                      np.array(_STATUS)[out.status], method, law, budget, along, out.friction_share)
-    change, low, high = out.energy[0].tolist()
-    return Impact(out.velocity[0], out.generalized_impulse[0], out.impulses[0], int(out.rank[0]), change, (low, high),
-                  float(out.clamp[0]), _STATUS[out.status[0]], method, law, budget, along[0],
-                  float(out.friction_share[0]))
+        change, low, high, clamp, share = out.numbers.T
+        return Impact(*out[:3], out.ends[:, 0], change, np.column_stack((low, high)), clamp,
+                      np.array(_STATUS)[out.ends[:, 1]], method, law, budget, along, share)
+    (rank, status), (change, low, high, clamp, share) = out.ends[0].tolist(), out.numbers[0].tolist()
+    return Impact(out.velocity[0], out.generalized_impulse[0], out.impulses[0], rank, change, (low, high), clamp,
+                  _STATUS[status], method, law, budget, along[0], share)
 
 
 @lru_cache(maxsize=8)
@@ -285,7 +285,7 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: 
     if pivot := cholesky(lower, lower):
         expected = f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)"
         return ArgumentError(named(names[0]), M, expected)
-    if out.status[refused] == NOT_CONVERGED:
+    if out.ends[refused, 1] == NOT_CONVERGED:
         return SolverError(f"Poisson's law: the active-set method did not converge on {len(J)} contacts")
     quantities = names[2], "generalized_impulse", "impulses", "tangential_impulses"
     for quantity, values in zip(quantities, out, strict=False):
@@ -343,6 +343,8 @@ def _array(name: str, value: Any, dimensions: int) -> Floats:
 
 def _coefficients(name: str, value: Any, size: int, each: str, low: float, high: float = 1.0) -> Floats:
     """Return one number, or one for each of `size` contacts or impacts, between low and high."""
+    if type(value) is float and low <= value <= high:
+        return np.array(value)
     given = real_numbers(value)
     if given is None or given.shape not in ((), (size,)):
         raise ArgumentError(name, value, f"a real number or shape ({size},), one per {each}")

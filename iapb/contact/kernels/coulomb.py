@@ -17,7 +17,7 @@ import numpy as np
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import contact_before, moving_tree
 from iapb.contact.kernels.impact_friction import slide, tangent_inertia
-from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
+from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
 from iapb.linalg import add, add_multiple, dot, dot_of, load, scale, solve_tree_blocks, store
 from iapb.mechanics.kernels.kinematics import add_point_force
 
@@ -109,7 +109,9 @@ def _gather(world, state):
             begin, held = before + 1, scale(world.dt, load(state.previous.friction_force, before))
         for a in range(size):
             j, tangent = count * size + a, tangent_of(n, a, size)
-            _gather_row(world, state, j, count, i, tangent)
+            f.rows[j] = 0.0
+            write_pair_row(world, state, f.tree[count], i, tangent, f.rows[j])
+            f.slip[j] = _whiten_pair_row(world, state, f.tree[count], f.rows[j])
             f.p[j] = dot(held, tangent)
             square += f.p[j] * f.p[j]
         if square > f.radius[count] * f.radius[count]:
@@ -121,28 +123,18 @@ def _gather(world, state):
 
 
 @kernel
-def _gather_row(world, state, j, r, i, tangent):
-    """Write row j of J L⁻ᵀ and its slip, for a tangent of contact i; r is the number of i among those with friction."""
-    f, lower, row, x = state.step_friction, state.lower, state.row, load(state.contacts.point, i)
-    width = f.rows.shape[1] // 2
-    f.rows[j] = 0.0
-    f.slip[j] = 0.0
+def _whiten_pair_row(world, state, trees, row):
+    """Overwrite a row of J by that of J L⁻ᵀ; return J v."""
+    speed = 0.0
     for side in range(2):
-        if f.tree[r, side] >= 0:
-            row[world.tree_start[f.tree[r, side]] : world.tree_stop[f.tree[r, side]]] = 0.0
-    add_body_row(world.mechanism, state.body, state.contacts.body_a[i], x, tangent, 1.0, row)
-    add_body_row(world.mechanism, state.body, state.contacts.body_b[i], x, tangent, -1.0, row)
-    for side in range(2):
-        tree = f.tree[r, side]
-        if tree < 0:
-            continue
-        start = world.tree_start[tree]
-        for k in range(start, world.tree_stop[tree]):
-            f.slip[j] += row[k] * state.v[k]
-            entry = row[k]
-            for h in range(start, k):
-                entry -= lower[k, h] * f.rows[j, side * width + h - start]
-            f.rows[j, side * width + k - start] = entry / lower[k, k]
+        if trees[side] >= 0:
+            start, own = world.tree_start[trees[side]], row[side * (row.shape[0] // 2) :]
+            for k in range(world.tree_stop[trees[side]] - start):
+                speed += own[k] * state.v[start + k]
+                for h in range(k):
+                    own[k] -= state.lower[start + k, start + h] * own[h]
+                own[k] /= state.lower[start + k, start + k]
+    return speed
 
 
 @kernel

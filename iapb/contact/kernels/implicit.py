@@ -23,7 +23,7 @@ import numpy as np
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import LEFT, contact_before, group_of_contact, moving_tree
-from iapb.contact.kernels.rows import add_body_row, friction_of, tangent_of
+from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
 from iapb.linalg import add, load, scale, store
 
 STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
@@ -157,7 +157,8 @@ def gather_contacts(world, state, group, s):
                 work.envelope[at] = min(work.envelope[at], work.offset[low])
         n = load(contacts.normal, i)
         for j in range(s):
-            write_row(world, state, count, count * s + j, i, n if j == 0 else tangent_of(n, j - 1, s - 1))
+            direction = n if j == 0 else tangent_of(n, j - 1, s - 1)
+            write_pair_row(world, state, work.tree[count], i, direction, work.rows[count * s + j])
         work.limit[count] = 0.0
         if s > 1:
             before = contact_before(state, i, begin)
@@ -168,25 +169,6 @@ def gather_contacts(world, state, group, s):
         count += 1
         i = work.next[i]
     return count
-
-
-@kernel
-def write_row(world, state, r, j, i, direction):
-    """Write row j of J, along a direction at contact i, which is number r of the group."""
-    work, row, x = state.rest_work, state.row, load(state.contacts.point, i)
-    width = work.rows.shape[1] // 2
-    for side in range(2):
-        t = work.tree[r, side]
-        if t >= 0:
-            row[world.tree_start[t] : world.tree_stop[t]] = 0.0
-    add_body_row(world.mechanism, state.body, state.contacts.body_a[i], x, direction, 1.0, row)
-    add_body_row(world.mechanism, state.body, state.contacts.body_b[i], x, direction, -1.0, row)
-    for side in range(2):
-        t = work.tree[r, side]
-        if t >= 0:
-            start = world.tree_start[t]
-            for k in range(world.tree_stop[t] - start):
-                work.rows[j, side * width + k] = row[start + k]
 
 
 @kernel

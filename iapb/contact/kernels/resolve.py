@@ -42,11 +42,8 @@ class Results(NamedTuple):
     generalized_impulse: np.ndarray  # (n, d)
     impulses: np.ndarray  # (n, c)
     tangential: np.ndarray  # (n, c m)
-    rank: np.ndarray  # (n,) int64
-    status: np.ndarray  # (n,) int64
-    clamp: np.ndarray  # (n,)
-    friction_share: np.ndarray  # (n,)
-    energy: np.ndarray  # (n, 3) change, its lower and its upper bound
+    ends: np.ndarray  # (n, 2) int64: rank, status
+    numbers: np.ndarray  # (n, 5) energy change, its lower and its upper bound, clamp, share of friction
 
 
 class ResolveWork(NamedTuple):
@@ -87,7 +84,7 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
     lower, impact = work.lower, work.impact
     for m in range(n):
         v_plus, momentum, p, p_t = out.velocity[m], out.generalized_impulse[m], out.impulses[m], out.tangential[m]
-        out.status[m] = REFUSED
+        out.ends[m, 1] = REFUSED
         sound, k, rounded = scale_impact(masses[m], jacobians[m], velocities[m], tangents is None, work)
         if not sound:
             return m
@@ -96,7 +93,7 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
             rank, clamp = poisson_impact(work.mass, lower, work.velocity, unequal[m], c, clamped, impact, work.push, p,
                                          work.v_plus, momentum)
             if rank < 0:
-                out.status[m] = NOT_CONVERGED
+                out.ends[m, 1] = NOT_CONVERGED
                 return m
             status = COMPLETE if clamp >= 1.0 - _UNSOLVED and separates(d, c, impact) else NOT_SOLVED
         else:
@@ -118,12 +115,12 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
                 clamp *= factor
                 status = COMPLETE if met else REDUCED
                 copy_into(p_t, work.friction.p)
-        factor = unscale_impact(masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.energy[m])
+        factor = unscale_impact(masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.numbers[m])
         clamp *= factor
-        if not (finite(v_plus) and finite(momentum) and finite(p) and finite(p_t) and math.isfinite(out.energy[m, 0])):
+        if not (finite(v_plus) and finite(momentum) and finite(p) and finite(p_t) and math.isfinite(out.numbers[m, 0])):
             return m
-        out.rank[m], out.clamp[m], out.friction_share[m] = rank, clamp, share
-        out.status[m] = CANCELLED if clamp == 0.0 or rounded and c > 0 else status
+        out.numbers[m, 3], out.numbers[m, 4] = clamp, share
+        out.ends[m, 0], out.ends[m, 1] = rank, CANCELLED if clamp == 0.0 or rounded and c > 0 else status
     return n
 
 

@@ -66,6 +66,22 @@ def direction_row(m, w, contacts, i, direction, out):
 
 
 @kernel
+def write_pair_row(world, state, trees, i, direction, out):
+    """Write the row along a direction at contact i to out (2 w,): w entries for each of its two trees (−1 = none)."""
+    row, x = state.row, load(state.contacts.point, i)
+    for side in range(2):
+        if trees[side] >= 0:
+            row[world.tree_start[trees[side]] : world.tree_stop[trees[side]]] = 0.0
+    add_body_row(world.mechanism, state.body, state.contacts.body_a[i], x, direction, 1.0, row)
+    add_body_row(world.mechanism, state.body, state.contacts.body_b[i], x, direction, -1.0, row)
+    for side in range(2):
+        if trees[side] >= 0:
+            start = world.tree_start[trees[side]]
+            for k in range(world.tree_stop[trees[side]] - start):
+                out[side * (out.shape[0] // 2) + k] = row[start + k]
+
+
+@kernel
 def friction_of(world, contacts, i):
     """Return μ of contact i, given by the friction classes of its two shapes."""
     return world.friction[world.friction_class[contacts.shape_a[i]], world.friction_class[contacts.shape_b[i]]]
