@@ -30,7 +30,7 @@ def gram_cholesky(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     W = J @ push
     length = np.sqrt(np.maximum(np.diag(W), 0.0))
     # The smallest eigenvalue of a Gram matrix of unit rows is known to c·ε only.
-    if not length.all() or np.linalg.eigvalsh(W / np.outer(length, length))[0] <= 8.0 * len(J) * _EPS:
+    if not length.all() or np.linalg.eigvalsh(W / np.outer(length, length)).min(initial=1.0) <= 8.0 * len(J) * _EPS:
         raise ArgumentError("contact_jacobian", J.shape, "independent rows for method 'gram_cholesky'")
     root = np.linalg.cholesky(0.5 * (W + W.T))
     return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(root.T, np.linalg.solve(root, J @ v))))
