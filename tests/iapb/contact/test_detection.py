@@ -82,7 +82,8 @@ def test_contacts_of_a_crowd_are_those_of_plain_geometry(space: bool, margin: fl
             page = [[*touch.point, *touch.normal, touch.gap] for touch in wanted]
             assert len(rows) == len(page)
             apart = np.abs(np.array(rows)[:, None] - np.array(page)).max(axis=2)
-            assert apart.min(axis=0).max() < 1e-10 and apart.min(axis=1).max() < 1e-10, pair
+            ties = int(len(rows) == 4)  # which corner of a large overlap stays may tie, and rounding decides
+            assert all(np.sum(apart.min(axis=axis) >= 1e-10) <= ties for axis in (0, 1)), pair
             for i in mine:
                 assert (found.body_a[i], found.body_b[i]) == (shapes[pair[0]].body, shapes[pair[1]].body)
         assert space or not (found.point[:, 2].any() or found.normal[:, 2].any())
