@@ -1,4 +1,4 @@
-"""Read contact problems of other projects: LCP text files (plain or gzip), MLCP text, FCLIB HDF5.
+"""Read contact problems of other projects: LCP text files (plain or gzip), MLCP text, FCLIB HDF5; write FCLIB.
 
 `read_problem(path)` chooses the format by the ending of the file's name:
 
@@ -7,29 +7,66 @@
   `lcp_Pang_isolated_sol` have a solution, and `lcp_CPS_2` equal example 4.4.7 of Cottle, Pang, Stone (1992).
 - .txt (OpenSurgSim): a labelled MLCP with constraint types, E, HCHt, friction and stored lambda; bilateral constraints
   of one to three dimensions and frictionless unilateral ones are read.
-- .hdf5, .h5: FCLIB, see `reference.fclib`.
+- .hdf5, .h5: the FrictionalContactLibrary (normal component first). fclib_local : u = W r + q;
+  fclib_global : M v = H r + f, u = Hᵀ v + w. Both have friction mu per contact and a solution (r, u, v). A solution of
+  zeros counts as absent, because unsolved files have one. A global problem is condensed with sparse factors:
+  W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f. The result includes its mechanics (M, J = Hᵀ) if w = 0 and it has at most
+  WITH_MECHANICS coordinates.
+
+Source: Acary, Brémond, Koziara, Pérignon, FCLIB: a collection of discrete 3D frictional contact problems (2014).
 """
 
 from __future__ import annotations
 
 import gzip
-from collections.abc import Callable
+from dataclasses import dataclass
+from operator import index
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from iapb.errors import ArgumentError, MissingDependencyError
+from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from iapb.lazy import needed
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
-from reference.fclib import LARGEST_SIZE, DatasetError, StoredProblem, read_fclib
+from reference.hdf5 import leads_out
 
+LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
+LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only
+WITH_MECHANICS = 2_000  # coordinates up to which a global problem keeps its dense M and J
 _LARGEST_TEXT = 64 << 20  # unpacked bytes, enough for 2,500 unknowns; a small gzip file can unpack to any size
+_BLOCK = 256  # columns of M⁻¹ H at a time: 25 MB for 12,000 coordinates
+_COLUMNS, _ROWS = -1, -2  # nz of compressed columns and compressed rows; nz >= 0 counts triplets
 
 # Rows of each constraint type of an MLCP file: True for a two-sided row.
 _MLCP_ROWS = {
     **{f"MLCP_BILATERAL_{n}D_CONSTRAINT": (True,) * n for n in (1, 2, 3)},
     "MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT": (False,),
 }
+
+
+class DatasetError(IapbError, ValueError):
+    """A problem file is damaged or has an unknown format."""
+
+    def __init__(self, path: Path | str, problem: str) -> None:
+        self.path = Path(path)
+        super().__init__(f"{self.path.name}: {problem}")
+
+
+@dataclass(frozen=True)
+class StoredProblem:
+    """A problem file as read.
+
+    problem : the ImpactProblem; stored_impulse : (n,) multipliers in the file, or None
+    remark : text in the file; format : name of the format
+    """
+
+    problem: ImpactProblem
+    stored_impulse: Floats | None = None
+    remark: str = ""
+    format: str = ""
 
 
 def read_problem(path: Path | str) -> StoredProblem:
@@ -43,18 +80,19 @@ def read_problem(path: Path | str) -> StoredProblem:
     ------
     DatasetError
         The file has an unknown format, is damaged or truncated, or is too large; the message says where.
+    MissingDependencyError
+        The file is an FCLIB problem, and h5py is not installed.
     """
     path = Path(path)
-    ending = next((ending for ending in _READERS if path.name.lower().endswith(ending)), None)
-    if ending is None:
+    reader = next((reader for ending, reader in _READERS.items() if path.name.lower().endswith(ending)), None)
+    if reader is None:
         raise DatasetError(path, f"unknown kind of file; known are {', '.join(_READERS)}")
-    reader = _READERS[ending]
     try:
-        return read_fclib(path) if reader is None else reader(path.name, _text(path))
-    except (DatasetError, MissingDependencyError):
+        return reader(path)
+    except MissingDependencyError:
         raise
     except Exception as error:  # a damaged or foreign file can raise any exception
-        raise DatasetError(path, f"cannot be read: {error}") from error
+        raise DatasetError(path, f"cannot be read: {' '.join(str(error).split())}") from error
 
 
 def problem_files(folder: Path | str) -> list[Path]:
@@ -71,29 +109,37 @@ def _text(path: Path) -> str:
         file.seek(0)
         raw = (gzip.GzipFile(fileobj=file) if packed else file).read(_LARGEST_TEXT + 1)
     if len(raw) > _LARGEST_TEXT:
-        raise DatasetError(path, f"larger than {_LARGEST_TEXT >> 20} MB: expected a smaller text file")
+        raise ValueError(f"larger than {_LARGEST_TEXT >> 20} MB: expected a smaller text file")
     return raw.decode("utf-8")
 
 
-def _lcp(name: str, text: str) -> StoredProblem:
-    n, *words = text.split()
-    matrix, q = _square(n, words)
-    return StoredProblem(ImpactProblem.from_delassus(matrix, q, name=name), format="LCP text")
+def _square(size: str, words: list[str]) -> tuple[Floats, Floats]:
+    """Return a matrix (n, n), row by row, and a vector (n,)."""
+    n = int(size)
+    if not 0 <= n <= LARGEST_SIZE or len(words) != n * n + n:
+        raise ValueError(f"size {n} with {len(words)} numbers, expected a size up to {LARGEST_SIZE} and {n * n + n}")
+    numbers = np.array(words, np.float64)
+    return numbers[: n * n].reshape(n, n), numbers[n * n :]
 
 
-def _siconos_lcp(name: str, text: str) -> StoredProblem:
-    n, flag, *sizes = text.split()[:6]
-    words, numbers = text.split()[6:], int(n) * (int(n) + 1)
+def _lcp(path: Path) -> StoredProblem:
+    n, *words = _text(path).split()
+    return StoredProblem(ImpactProblem.from_delassus(*_square(n, words), name=path.name), format="LCP text")
+
+
+def _siconos_lcp(path: Path) -> StoredProblem:
+    n, flag, *words = _text(path).split()
+    sizes, numbers, remark = words[:4], words[4 : 4 + int(n) * (int(n) + 1)], words[4 + int(n) * (int(n) + 1) :]
     if int(flag) != 0 or sizes != [n] * 4:
         raise ValueError(f"storage flag {flag}, sizes {sizes}: expected flag 0 (dense) and four times {n}")
-    matrix, q = _square(n, words[:numbers])
-    problem = ImpactProblem.from_delassus(matrix.T, q, name=name)
-    return StoredProblem(problem, remark=" ".join(words[numbers:]), format="Siconos LCP")
+    matrix, q = _square(n, numbers)
+    problem = ImpactProblem.from_delassus(matrix.T, q, name=path.name)
+    return StoredProblem(problem, remark=" ".join(remark), format="Siconos LCP")
 
 
-def _mlcp(name: str, text: str) -> StoredProblem:
+def _mlcp(path: Path) -> StoredProblem:
     fields: dict[str, str] = {}  # of 'label = value' entries, whose bracketed values may span lines
-    label, remark, (text, mark, _) = "", "", text.partition("\n==")
+    label, remark, (text, mark, _) = "", "", _text(path).partition("\n==")
     if not mark:
         raise ValueError("has no end mark '== END ==': cut off, or not an MLCP file")
     for line in text.splitlines():
@@ -104,29 +150,115 @@ def _mlcp(name: str, text: str) -> StoredProblem:
             fields[label] = value
         elif label:
             fields[label] += " " + line.strip()
-    types = fields["constraint types"].split()
-    if other := sorted(set(types) - set(_MLCP_ROWS)):
-        raise ValueError(f"holds constraints that are not read here: {', '.join(other)}")
-    bilateral = np.array([two_sided for kind in types for two_sided in _MLCP_ROWS[kind]], np.bool_)
+    bilateral = np.array([two_sided for kind in fields["constraint types"].split() for two_sided in _MLCP_ROWS[kind]])
     words = {key: fields[key].replace("(", " ").replace(")", " ").split() for key in ("E", "lambda", "HCHt")}
     w, q = _square(str(len(words["E"])), words["HCHt"] + words["E"])
-    multipliers = np.array([float(word) for word in words["lambda"]])
-    if len(multipliers) != len(q) or not np.isfinite(multipliers).all():
-        raise ValueError(f"lambda holds {len(multipliers)} numbers, expected {len(q)} finite ones")
     joints = bilateral if bilateral.any() or len(bilateral) != len(q) else None
-    problem = ImpactProblem.from_delassus(w, q, bilateral=joints, name=name)
-    return StoredProblem(problem, multipliers, remark, "MLCP text")
+    problem = ImpactProblem.from_delassus(w, q, bilateral=joints, name=path.name)
+    return StoredProblem(problem, np.array(words["lambda"], np.float64), remark, "MLCP text")
 
 
-def _square(size: str, words: list[str]) -> tuple[Floats, Floats]:
-    """Return a matrix (n, n), row by row, and a vector (n,)."""
-    n = int(size)
-    if not 0 <= n <= LARGEST_SIZE or len(words) != n * n + n:
-        raise ValueError(f"size {n} with {len(words)} numbers, expected a size up to {LARGEST_SIZE} and {n * n + n}")
-    numbers = np.array([float(word) for word in words])
-    return numbers[: n * n].reshape(n, n), numbers[n * n :]
+def _fclib(path: Path) -> StoredProblem:
+    with needed("h5py", "FCLIB files").File(path, "r") as file:
+        if outside := leads_out(file):
+            raise ValueError(f"{outside}: expected a file without links to other files")
+        kind = "fclib_local" if "fclib_local" in file else "fclib_global"
+        group = file[kind]
+        given: dict[str, Any] = {"restitution": 0.0, "friction": _numbers(group, "vectors/mu"), "name": path.name,
+                 "contact_size": _whole(group, "spacedim")}  # fmt: skip
+        if given["contact_size"] not in (2, 3):
+            raise ValueError(f"spacedim {given['contact_size']}: expected 2 or 3")
+        if kind == "fclib_global":
+            problem = _condensed(group, given)
+        else:
+            w = _matrix(group["W"], LARGEST_SIZE).toarray()
+            problem = ImpactProblem.from_delassus(w, _numbers(group, "vectors/q"), **given)
+        r = _numbers(file, "solution/r") if "solution/r" in file else np.zeros(0)
+        stored = r if r.any() and len(r) == problem.size else None  # zeros are a placeholder, not a solution
+        title = bytes(group["info/title"][()]) if "info/title" in group else b""
+        return StoredProblem(problem, stored, " ".join(title.decode("utf-8", "replace").rstrip("\0").split()), kind)
 
 
-_READERS: dict[str, Callable[[str, str], StoredProblem] | None] = {
-    ".lcp": _lcp, ".lcp.gz": _lcp, ".dat": _siconos_lcp, ".txt": _mlcp, ".hdf5": None, ".h5": None,
-}
+def _condensed(group: Any, given: dict[str, Any]) -> ImpactProblem:
+    """Return a global problem with only its contacts as unknowns."""
+    from scipy.sparse.linalg import splu
+
+    mass, h = _matrix(group["M"], LARGEST_MATRIX), _matrix(group["H"], LARGEST_MATRIX)
+    f, w = _numbers(group, "vectors/f"), _numbers(group, "vectors/w")
+    if len(w) > LARGEST_SIZE or h.shape != (len(f), len(w)):
+        raise ValueError(f"H {h.shape}, f {f.shape}, w {w.shape}: expected at most {LARGEST_SIZE} unknowns")
+    factors = splu(mass)
+    free = factors.solve(f)
+    if not w.any() and len(f) <= WITH_MECHANICS:
+        return ImpactProblem.from_impact(mass.toarray(), h.T.toarray(), free, **given)
+    # w ≠ 0 has no generalized velocity, and a large dense M needs too much memory: return W and q only
+    delassus = np.hstack([h.T @ factors.solve(h[:, k : k + _BLOCK].toarray()) for k in range(0, len(w), _BLOCK)]
+                         or [np.zeros((0, 0))])  # fmt: skip
+    return ImpactProblem.from_delassus(delassus, h.T @ free + w, **given)
+
+
+def _numbers(group: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
+    """Return a dataset of numbers as a vector; its header is checked before it is read."""
+    dataset = group[name]
+    if dataset.dtype.kind not in "iuf" or dataset.size > LARGEST_SIZE**2:
+        raise ValueError(f"{name}: {dataset.dtype}, {dataset.shape}: expected at most {LARGEST_SIZE**2} numbers")
+    return np.asarray(dataset[()], dtype).ravel()
+
+
+def _whole(group: Any, name: str) -> int:
+    return index(_numbers(group, name, None).item())
+
+
+def _matrix(group: Any, most: int) -> Any:
+    """Return a CXSparse matrix as a sparse matrix of compressed columns."""
+    from scipy import sparse
+
+    m, n, nz = (_whole(group, key) for key in ("m", "n", "nz"))
+    i, p, x = _numbers(group, "i", None), _numbers(group, "p", None), _numbers(group, "x")
+    if not (0 <= m <= most and 0 <= n <= most):
+        raise ValueError(f"{group.name} of {m} x {n}: expected at most {most} rows and columns")
+    if nz in (_ROWS, _COLUMNS):
+        compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)((x, i, p), shape=(m, n))
+        compressed.check_format(full_check=True)  # an index out of range would write outside the array
+        return compressed.tocsc()
+    if not 0 <= nz <= len(x):
+        raise ValueError(f"{group.name} with nz = {nz}: expected -1, -2 or the number of its entries")
+    return sparse.coo_matrix((x[:nz], (i[:nz], p[:nz])), shape=(m, n)).tocsc()
+
+
+_READERS = {".lcp": _lcp, ".lcp.gz": _lcp, ".dat": _siconos_lcp, ".txt": _mlcp, ".hdf5": _fclib, ".h5": _fclib}
+
+
+def write_fclib(path: Path | str, problem: ImpactProblem, title: str = "", impulse: Floats | None = None) -> None:
+    """Write a problem (and its solution) as fclib_local; W is stored as compressed rows.
+
+    A frictionless problem is written with two zero tangential components per contact and mu = 0. Restitution is
+    included in q, because FCLIB has no e; reading the file gives the same complementarity problem with e = 0.
+    """
+    if problem.relaxed:
+        raise ArgumentError("problem", problem.name, "Coulomb's law: FCLIB has no mark for the relaxed one")
+    w, q, r, size = problem.delassus, problem.offset, impulse, problem.contact_size
+    if size == 1:
+        size, normals = 3, np.arange(0, 3 * problem.size, 3)
+        w, q = np.zeros((3 * problem.size,) * 2), np.zeros(3 * problem.size)
+        w[np.ix_(normals, normals)], q[normals] = problem.delassus, problem.offset
+        if impulse is not None:
+            r = np.zeros(3 * problem.size)
+            r[normals] = impulse
+    with needed("h5py", "FCLIB files").File(path, "w") as file:
+        group = file.create_group("fclib_local")
+        _write_rows(group.create_group("W"), w)
+        group["vectors/q"], group["vectors/mu"] = q, problem.friction_or_zero
+        group["spacedim"] = np.array([size], np.int32)
+        group["info/title"] = np.bytes_(title or problem.name or "iapb")
+        if r is not None:
+            file["solution/r"], file["solution/u"] = r, w @ r + q
+
+
+def _write_rows(group: Any, matrix: Floats) -> None:
+    from scipy import sparse
+
+    rows = sparse.csr_matrix(matrix)
+    for name, number in (("m", rows.shape[0]), ("n", rows.shape[1]), ("nz", _ROWS), ("nzmax", rows.nnz)):
+        group[name] = np.array([number], np.int32)
+    group["i"], group["p"], group["x"] = rows.indices.astype(np.int32), rows.indptr.astype(np.int32), rows.data

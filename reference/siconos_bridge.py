@@ -1,7 +1,8 @@
 """Siconos (INRIA) in a process of the system's Python, which solves problems and simulates scenes.
 
 Siconos is a package of the system's Python, not of this environment. One process answers all requests, one line of JSON
-each. If it dies or does not answer in time, the request has failed, and the next one gets a new process.
+each. If it dies or does not answer in time, the request has failed, and the next one gets a new process. Its
+solvers are Lemke, nonsmooth Gauss-Seidel and Alart-Curnier Newton; their time is without the transfer to the process.
 Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008); Siconos 4.
 """
 
@@ -14,11 +15,17 @@ import subprocess
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
+import numpy as np
+
 from iapb.errors import MissingDependencyError, SolverError
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import Answer, velocity_scale
 
 SYSTEM_PYTHON = "/usr/bin/python3"
 INSTALL = "apt-get install python3-siconos"
 _LONGEST = 120.0  # longest time of an answer [s]; the largest stored problems take a few seconds
+_METHODS = {"LEMKE": "SICONOS_LCP_LEMKE", "NSGS": "SICONOS_FRICTION_3D_NSGS", "NSN_AC": "SICONOS_FRICTION_3D_NSN_AC"}
+_ACCURACY, _ITERATIONS = 1e-12, 20_000  # requested at unit W and b
 _running: list[subprocess.Popen[bytes]] = []
 
 
@@ -77,3 +84,16 @@ def _line(process: subprocess.Popen[bytes], longest: float | None) -> bytes:
         process.wait()
         raise ValueError("its process ended" if ready else f"no answer within {longest:g} s")
     return line
+
+
+def solve(problem: ImpactProblem, method: str) -> Answer:
+    """Return the impulse by `method` ("LEMKE", "NSGS" or "NSN_AC"), whose residuals show whether it converged."""
+    frictional = problem.friction is not None
+    if frictional and (problem.contact_size != 3 or problem.relaxed):
+        raise SolverError("refused: takes Coulomb's law on contacts of three components only")
+    inertia, speed = float(np.abs(problem.delassus).max(initial=0.0)) or 1.0, velocity_scale(problem)
+    said = ask({"do": "solve", "method": _METHODS[method], "accuracy": _ACCURACY, "iterations": _ITERATIONS,
+                "matrix": (problem.delassus / inertia).tolist(), "offset": (problem.offset / speed).tolist(),
+                "friction": problem.friction_or_zero.tolist() if frictional else None})  # fmt: skip
+    note = f"{method}: status {said['status']} after {said['iterations']} iterations"
+    return Answer(np.array(said["impulse"]) * speed / inertia, note, seconds=float(said["seconds"]))

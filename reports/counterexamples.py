@@ -17,7 +17,7 @@ import numpy as np
 from iapb.errors import IapbError, RunFileError
 from iapb.scene import scene_from_text
 from reference.complementarity.problem import ImpactProblem
-from reference.fclib import write_fclib
+from reference.datasets import write_fclib
 from reference.one_thread import one_thread
 from reference.worlds import run_world
 from reports.by_name import function_named

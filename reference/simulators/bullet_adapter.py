@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.metadata import version
 from math import sqrt
 from typing import Any
 
-from reference.simulators.scene import Cuboid, FixedScene, Quaternion, Sphere, Vector
+from reference.simulators.scene import Cuboid, FixedScene, Obstacle, RigidBody, Sphere
 from reference.simulators.simulator import Settings, engine
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 DEFAULT_STEP = 1.0 / 240.0  # [s]
 DEFAULT_ERP = 0.2  # share of an overlap that the solver removes in a step
-ITERATIONS, ITERATIONS_OF_A_STACK = 50.0, 1e4  # the default; for the stack the best of 50, 1000 and 10 000
+ITERATIONS, ITERATIONS_OF_A_STACK = 50, 10_000  # the default; for the stack the best of 50, 1000 and 10 000
+_SOLVER = ("numSolverIterations", "restitutionVelocityThreshold", "erp", "contactERP", "solverResidualThreshold")
+_BODY = ("linearDamping", "angularDamping", "contactProcessingThreshold")
 
 
 class Bullet:
@@ -44,61 +47,52 @@ class Bullet:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `stepSimulation`."""
-        bullet = engine("pybullet")
-        world = bullet.connect(bullet.DIRECT)
-        try:
-            bodies = _build(bullet, world, scene, settings, step)
-            record, stride, last = Recorder(), steps_between_samples(step), round(duration / step)
-            for k in range(last + 1):
-                if k % stride == 0 or k == last:
-                    places = (bullet.getBasePositionAndOrientation(body, physicsClientId=world) for body in bodies)
-                    speeds = (bullet.getBaseVelocity(body, physicsClientId=world) for body in bodies)
-                    touching = len(bullet.getContactPoints(physicsClientId=world))
-                    x, turn, v, spin = (*zip(*places, strict=True), *zip(*speeds, strict=True))
-                    record.add(k * step, x, turn, v, spin, touching)
-                if k < last:
-                    bullet.stepSimulation(physicsClientId=world)
-        finally:
-            bullet.disconnect(world)
+        bullet = _World(engine("pybullet"))
+        solver = {name: settings.options[name] for name in _SOLVER}
+        bullet.setPhysicsEngineParameter(fixedTimeStep=step, numSubSteps=0, **solver)
+        bullet.setGravity(*scene.gravity)
+        for wall in scene.obstacles:
+            _add(bullet, wall, settings.options)
+        bodies = [_add(bullet, body, settings.options) for body in scene.bodies]
+        record, stride, last = Recorder(), steps_between_samples(step), round(duration / step)
+        for k in range(last + 1):
+            if k % stride == 0 or k == last:
+                x, turn = zip(*map(bullet.getBasePositionAndOrientation, bodies), strict=True)
+                v, spin = zip(*map(bullet.getBaseVelocity, bodies), strict=True)
+                record.add(k * step, x, turn, v, spin, len(bullet.getContactPoints()))
+            if k < last:
+                bullet.stepSimulation()
         return record.trajectory()
 
 
-def _build(bullet: Any, world: int, scene: FixedScene, settings: Settings, step: float) -> list[int]:
-    given = settings.options
-    bullet.setPhysicsEngineParameter(
-        fixedTimeStep=step, numSubSteps=0, numSolverIterations=int(given["numSolverIterations"]),
-        restitutionVelocityThreshold=given["restitutionVelocityThreshold"], erp=given["erp"],
-        contactERP=given["contactERP"], solverResidualThreshold=given["solverResidualThreshold"], physicsClientId=world,
-    )  # fmt: skip
-    bullet.setGravity(*scene.gravity, physicsClientId=world)
-    for wall in scene.obstacles:
-        _body(bullet, world, 0.0, (Cuboid(wall.size),), wall.center, wall.orientation, given)
-    bodies = []
-    for body in scene.bodies:
-        made = _body(bullet, world, body.mass, body.shapes, body.position, body.orientation, given)
-        bullet.changeDynamics(made, -1, localInertiaDiagonal=body.inertia, physicsClientId=world)
-        bullet.resetBaseVelocity(made, body.velocity, body.spin, physicsClientId=world)
-        bodies.append(made)
-    return bodies
+class _World:
+    """PyBullet's functions, called with the number of an own world, which ends with this object."""
+
+    def __init__(self, module: Any) -> None:
+        self.module, self.number = module, module.connect(module.DIRECT)
+
+    def __getattr__(self, name: str) -> Any:
+        return partial(getattr(self.module, name), physicsClientId=self.number)
+
+    def __del__(self) -> None:
+        self.disconnect()
 
 
-def _body(bullet: Any, world: int, mass: float, shapes: tuple[Sphere | Cuboid, ...], position: Vector,
-          orientation: Quaternion, given: Any) -> int:  # fmt: skip
-    if isinstance(shapes[0], Sphere):
-        shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=shapes[0].radius, physicsClientId=world)
+def _add(bullet: Any, body: RigidBody | Obstacle, given: Any) -> int:
+    """Add a body, or an obstacle as one of mass zero."""
+    if isinstance(body.shapes[0], Sphere):
+        shape = bullet.createCollisionShape(bullet.module.GEOM_SPHERE, radius=body.shapes[0].radius)
     else:
-        boxes = [box for box in shapes if isinstance(box, Cuboid)]
-        halves, types = [[0.5 * length for length in box.size] for box in boxes], [bullet.GEOM_BOX] * len(boxes)
-        if len(boxes) == 1:
-            shape = bullet.createCollisionShape(types[0], halfExtents=halves[0], physicsClientId=world)
-        else:
-            shape = bullet.createCollisionShapeArray(shapeTypes=types, halfExtents=halves, physicsClientId=world,
-                                                     collisionFramePositions=[box.center for box in boxes])  # fmt: skip
-    made: int = bullet.createMultiBody(mass, shape, -1, position, orientation, physicsClientId=world)
-    bullet.changeDynamics(
-        made, -1, restitution=given["restitution of each body"], lateralFriction=0.0, rollingFriction=0.0,
-        spinningFriction=0.0, linearDamping=given["linearDamping"], angularDamping=given["angularDamping"],
-        contactProcessingThreshold=given["contactProcessingThreshold"],
-        activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=world,
-    )  # fmt: skip
+        boxes = [box for box in body.shapes if isinstance(box, Cuboid)]
+        halves, kind = [[0.5 * length for length in box.size] for box in boxes], bullet.module.GEOM_BOX
+        shape = (bullet.createCollisionShape(kind, halfExtents=halves[0]) if len(boxes) == 1 else
+                 bullet.createCollisionShapeArray([kind] * len(boxes), halfExtents=halves,
+                                                  collisionFramePositions=[box.center for box in boxes]))  # fmt: skip
+    made: int = bullet.createMultiBody(body.mass, shape, -1, body.position, body.orientation)
+    bullet.changeDynamics(made, -1, restitution=given["restitution of each body"], lateralFriction=0.0,
+                          rollingFriction=0.0, spinningFriction=0.0, **{name: given[name] for name in _BODY},
+                          activationState=bullet.module.ACTIVATION_STATE_DISABLE_SLEEPING)  # fmt: skip
+    if isinstance(body, RigidBody):
+        bullet.changeDynamics(made, -1, localInertiaDiagonal=body.inertia)
+        bullet.resetBaseVelocity(made, body.velocity, body.spin)
     return made

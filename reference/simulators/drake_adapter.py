@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from reference.simulators.scene import Cuboid, FixedScene, Quaternion, RigidBody, Sphere, Vector
+from reference.simulators.scene import FixedScene, Obstacle, RigidBody, Sphere
 from reference.simulators.simulator import Settings, engine, viscous_dissipation_for
 from reference.simulators.trajectory import SAMPLE_INTERVAL, Recorder, Trajectory
 
@@ -58,14 +58,12 @@ class Drake:
         plant, diagram, bodies = _build(drake, scene, settings, step)
         simulator = drake.Simulator(diagram)
         if given["mode"] == CONTINUOUS:
-            config = drake.SimulatorConfig(integration_scheme="runge_kutta3", max_step_size=step,
-                                           accuracy=float(given["accuracy"]))  # fmt: skip
-            drake.ApplySimulatorConfig(config, simulator)
+            drake.ApplySimulatorConfig(drake.SimulatorConfig(integration_scheme="runge_kutta3", max_step_size=step,
+                                                             accuracy=given["accuracy"]), simulator)  # fmt: skip
         context = plant.GetMyContextFromRoot(simulator.get_mutable_context())
         for body, made in zip(scene.bodies, bodies, strict=True):
-            plant.SetFreeBodyPose(context, made, _pose(drake, body.position, body.orientation))
-            speed = drake.SpatialVelocity(np.array(body.spin), np.array(body.velocity))
-            plant.SetFreeBodySpatialVelocity(context, made, speed)
+            plant.SetFreeBodyPose(context, made, _pose(drake, body))
+            plant.SetFreeBodySpatialVelocity(context, made, drake.SpatialVelocity(body.spin, body.velocity))
         simulator.Initialize()
         record, interval = Recorder(), max(step, SAMPLE_INTERVAL)
         for k in range(round(duration / interval) + 1):
@@ -73,60 +71,50 @@ class Drake:
             places = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
             speeds = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
             wxyz = np.array([place.rotation().ToQuaternion().wxyz() for place in places])
-            record.add(k * interval, np.array([place.translation() for place in places]), wxyz[:, [1, 2, 3, 0]],
-                       np.array([speed.translational() for speed in speeds]),
-                       np.array([speed.rotational() for speed in speeds]),
+            record.add(k * interval, [place.translation() for place in places], wxyz[:, [1, 2, 3, 0]],
+                       [speed.translational() for speed in speeds], [speed.rotational() for speed in speeds],
                        plant.get_contact_results_output_port().Eval(context).num_point_pair_contacts())  # fmt: skip
         return record.trajectory()
 
 
 def _build(drake: Any, scene: FixedScene, settings: Settings, step: float) -> tuple[Any, Any, list[Any]]:
     """Return plant, diagram and bodies; a frictionless contact has two equal springs in series."""
-    builder, given = drake.DiagramBuilder(), settings.options
-    time_step = 0.0 if given["mode"] == CONTINUOUS else step
-    plant, geometry = drake.AddMultibodyPlantSceneGraph(builder, time_step)
-    if time_step:
+    builder, bodies, given = drake.DiagramBuilder(), list[Any](), settings.options
+    plant, geometry = drake.AddMultibodyPlantSceneGraph(builder, 0.0 if given["mode"] == CONTINUOUS else step)
+    if given["mode"] == DISCRETE:
         plant.set_discrete_contact_approximation(drake.DiscreteContactApproximation.kSap)
     if "sap_near_rigid_threshold" in given:
-        plant.set_sap_near_rigid_threshold(float(given["sap_near_rigid_threshold"]))
-    plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
+        plant.set_sap_near_rigid_threshold(given["sap_near_rigid_threshold"])
+    plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
     material, stiffness = drake.ProximityProperties(), 2.0 * float(given.get("point_contact_stiffness", 0.0))
     drake.AddContactMaterial(given.get("hunt_crossley_dissipation"), stiffness or None,
                              drake.CoulombFriction(0.0, 0.0), material)  # fmt: skip
     if "relaxation_time" in given:
         material.AddProperty("material", "relaxation_time", given["relaxation_time"])
     for wall in scene.obstacles:
-        place = _pose(drake, wall.center, wall.orientation)
-        plant.RegisterCollisionGeometry(plant.world_body(), place, drake.Box(*wall.size), wall.name, material)
+        box, place = drake.Box(*wall.size), _pose(drake, wall)
+        plant.RegisterCollisionGeometry(plant.world_body(), place, box, wall.name, material)
     balls, boxes, radius = drake.GeometrySet(), drake.GeometrySet(), float(given["corner radius"])
-    bodies = []
     for body in scene.bodies:
-        inertia = drake.SpatialInertia(body.mass, np.zeros(3),
-                                       drake.UnitInertia(*(moment / body.mass for moment in body.inertia)))  # fmt: skip
-        made = plant.AddRigidBody(body.name, inertia)
-        bodies.append(made)
-
-        def register(shape: Any, center: Any, name: str, body: RigidBody = body, made: Any = made) -> Any:
-            place = drake.RigidTransform(np.array(center))
-            return plant.RegisterCollisionGeometry(made, place, shape, f"{body.name} {name}", material)
-
-        # a box has small balls at its corners and, if there are other bodies, also its faces
+        inertia = drake.UnitInertia(*(moment / body.mass for moment in body.inertia))
+        bodies.append(plant.AddRigidBody(body.name, drake.SpatialInertia(body.mass, np.zeros(3), inertia)))
         for number, shape in enumerate(body.shapes):
+            center, parts = np.array(shape.center), list[Any]()
             if isinstance(shape, Sphere):
-                register(drake.Sphere(shape.radius), shape.center, f"ball {number}")
-                continue
-            for sign in product((-1.0, 1.0), repeat=3):
-                corner = np.array(shape.center) + (0.5 * np.array(shape.size) - radius) * np.array(sign)
-                balls.Add(register(drake.Sphere(radius), corner, f"corner {number} {sign}"))
-            if len(scene.bodies) > 1:
-                boxes.Add(register(drake.Box(*shape.size), shape.center, f"box {number}"))
+                parts = [(drake.Sphere(shape.radius), center, drake.GeometrySet())]
+            else:  # small balls at the corners and, if there are other bodies, also faces
+                reach = 0.5 * np.array(shape.size) - radius
+                parts = [(drake.Sphere(radius), center + reach * sign, balls) for sign in product((-1, 1), repeat=3)]
+                parts += [(drake.Box(*shape.size), center, boxes)] * (len(scene.bodies) > 1)
+            for k, (part, middle, group) in enumerate(parts):
+                group.Add(plant.RegisterCollisionGeometry(bodies[-1], drake.RigidTransform(middle), part,
+                                                          f"{body.name} {number} {k}", material))  # fmt: skip
     plant.Finalize()
-    if any(isinstance(shape, Cuboid) for body in scene.bodies for shape in body.shapes):
-        rules = drake.CollisionFilterDeclaration().ExcludeWithin(balls).ExcludeWithin(boxes)
-        geometry.collision_filter_manager().Apply(rules)  # only corners and faces collide
+    rules = drake.CollisionFilterDeclaration().ExcludeWithin(balls).ExcludeWithin(boxes)
+    geometry.collision_filter_manager().Apply(rules)  # of a box, only corners and faces collide
     return plant, builder.Build(), bodies
 
 
-def _pose(drake: Any, position: Vector, orientation: Quaternion) -> Any:
-    x, y, z, w = orientation
-    return drake.RigidTransform(drake.Quaternion(w, x, y, z), np.array(position))
+def _pose(drake: Any, body: RigidBody | Obstacle) -> Any:
+    x, y, z, w = body.orientation
+    return drake.RigidTransform(drake.Quaternion(w, x, y, z), body.position)

@@ -70,12 +70,10 @@ def _model_text(scene: FixedScene, settings: Settings, step: float) -> str:
     """Return the scene as MJCF."""
     given = settings.options
     contact = f'condim="{given["condim"]:g}" solref="{given["solref"]}" solimp="{given["solimp"]}"'
-    walls = "".join(_geom(Cuboid(wall.size, wall.center), wall.orientation) for wall in scene.obstacles)
-    bodies = "".join(
-        f'<body name="{body.name}"><freejoint/>'
-        f'<inertial pos="0 0 0" mass="{body.mass!r}" diaginertia="{_text(body.inertia)}"/>'
-        f"{''.join(_geom(shape) for shape in body.shapes)}</body>" for body in scene.bodies
-    )  # fmt: skip
+    walls = "".join(_geom(Cuboid(wall.size, wall.position), wall.orientation) for wall in scene.obstacles)
+    bodies = "".join(f'<body name="{body.name}"><freejoint/>'
+                     f'<inertial pos="0 0 0" mass="{body.mass!r}" diaginertia="{_text(body.inertia)}"/>'
+                     f"{''.join(map(_geom, body.shapes))}</body>" for body in scene.bodies)  # fmt: skip
     return (
         f'<mujoco><option timestep="{step!r}" integrator="{given["integrator"]}" gravity="{_text(scene.gravity)}" '
         f'tolerance="{given["tolerance"]!r}" iterations="200"/><default><geom {contact}/></default>'
@@ -84,9 +82,9 @@ def _model_text(scene: FixedScene, settings: Settings, step: float) -> str:
 
 
 def _geom(shape: Sphere | Cuboid, turn: Quaternion = UPRIGHT) -> str:
-    sphere = isinstance(shape, Sphere)
+    kind = "sphere" if isinstance(shape, Sphere) else "box"
     size = (shape.radius,) if isinstance(shape, Sphere) else tuple(0.5 * length for length in shape.size)
-    return (f'<geom type="{"sphere" if sphere else "box"}" size="{_text(size)}" pos="{_text(shape.center)}" '
+    return (f'<geom type="{kind}" size="{_text(size)}" pos="{_text(shape.center)}" '
             f'quat="{_text((turn[3], *turn[:3]))}"/>')  # fmt: skip
 
 

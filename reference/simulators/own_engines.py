@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
@@ -68,11 +69,9 @@ class RigidWorld(ImpulseAugmentedEngine):
 def own_scene(scene: FixedScene, step: float, duration: float, **contact: float | str) -> Scene:
     """Return a fixed scene as a `Scene`, with contact settings by the names of a scene file."""
     document: dict[str, Any] = {
-        "name": scene.name, "dimensions": 3, "rate": 1.0 / step, "duration": duration,
-        "contact": {"restitution": scene.restitution, **contact}, "bodies": [], "walls": [],
+        "name": scene.name, "dimensions": 3, "rate": 1.0 / step, "duration": duration, "bodies": [], "walls": [],
+        "contact": {"restitution": scene.restitution, **contact}, "gravity": scene.gravity,
     }  # fmt: skip
-    if any(scene.gravity):
-        document["gravity"] = list(scene.gravity)
     for body in scene.bodies:
         turn = rotation(body.orientation)
         local = [*(turn.T @ np.array(body.velocity)), *(turn.T @ np.array(body.spin))]
@@ -83,13 +82,12 @@ def own_scene(scene: FixedScene, step: float, duration: float, **contact: float 
     for wall in scene.obstacles:
         turn = rotation(wall.orientation)  # as roll, pitch, yaw, for less than 90 degrees about y
         rpy = [np.arctan2(turn[2, 1], turn[2, 2]), np.arcsin(-turn[2, 0]), np.arctan2(turn[1, 0], turn[0, 0])]
-        document["walls"].append({"name": wall.name, **_shape(Cuboid(wall.size, wall.center)), "rpy": rpy})
+        document["walls"].append({"name": wall.name, "rpy": rpy, **_shape(Cuboid(wall.size, wall.position))})
     return scene_from_text(json.dumps(document))
 
 
 def _shape(shape: Sphere | Cuboid) -> dict[str, Any]:
-    size = {"radius": shape.radius} if isinstance(shape, Sphere) else {"size": shape.size}
-    return {"kind": "sphere" if "radius" in size else "box", **size, "center": shape.center}
+    return {"kind": "sphere" if isinstance(shape, Sphere) else "box", **asdict(shape)}
 
 
 def world_state(q: Floats, v: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -62,12 +62,18 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A fixed box: full side lengths [m], centre [m] and orientation."""
+    """A fixed box: full side lengths [m], centre [m] and orientation. As a body, it has mass 0 and one shape."""
 
     name: str
     size: Vector
-    center: Vector
+    position: Vector
     orientation: Quaternion = UPRIGHT
+    mass = 0.0
+
+    @property
+    def shapes(self) -> tuple[Cuboid]:
+        """The box, about its centre."""
+        return (Cuboid(self.size),)
 
 
 @dataclass(frozen=True)

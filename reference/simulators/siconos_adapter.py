@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 from iapb.errors import IapbError, MissingDependencyError, SolverError
 from reference.siconos_bridge import INSTALL, ask
-from reference.simulators.scene import Cuboid, FixedScene, Sphere, rotation
+from reference.simulators.scene import FixedScene, rotation
 from reference.simulators.simulator import Settings
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
@@ -39,12 +39,9 @@ class Siconos:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate in the process of `reference.siconos_bridge`."""
-        bodies = [{"position": body.position, "orientation": body.orientation, "velocity": body.velocity,
-                   "local_spin": (rotation(body.orientation).T @ np.array(body.spin)).tolist(), "mass": body.mass,
-                   "inertia": body.inertia, "shapes": [_shape(shape) for shape in body.shapes]}
+        bodies = [asdict(body) | {"local_spin": (rotation(body.orientation).T @ np.array(body.spin)).tolist()}
                   for body in scene.bodies]  # fmt: skip
-        obstacles = [{"position": wall.center, "orientation": wall.orientation, "shapes": [_shape(Cuboid(wall.size))]}
-                     for wall in scene.obstacles]  # fmt: skip
+        obstacles = [asdict(wall) | {"shapes": [asdict(shape) for shape in wall.shapes]} for wall in scene.obstacles]
         found = ask({"do": "simulate", **settings.options, "step": step, "duration": duration, "bodies": bodies,
                      "obstacles": obstacles, "stride": steps_between_samples(step), "gravity": scene.gravity,
                      "restitution": scene.restitution}, longest=None)  # fmt: skip
@@ -66,8 +63,3 @@ def _version() -> str:
         return str(ask({"do": "version"})["version"])
     except (MissingDependencyError, SolverError):
         return ""
-
-
-def _shape(shape: Sphere | Cuboid) -> dict[str, Any]:
-    size = {"radius": shape.radius} if isinstance(shape, Sphere) else {"size": shape.size}
-    return {**size, "center": shape.center}

@@ -78,15 +78,13 @@ def deepest_overlap(scene: FixedScene, motion: Trajectory, instants: int = 2000)
     overlap along the normals of their faces (separating axes; edge axes are not needed for faces in contact).
     """
     every = max(1, len(motion.time) // instants)
-    frames = [(body.shapes, motion.position[::every, k], rotation(motion.orientation[::every, k]))
-              for k, body in enumerate(scene.bodies)]  # fmt: skip
-    count = len(motion.time[::every])
-    frames += [((Cuboid(wall.size),), np.broadcast_to(np.array(wall.center), (count, 3)),
-                np.broadcast_to(rotation(wall.orientation), (count, 3, 3))) for wall in scene.obstacles]  # fmt: skip
-    depths = [float(_overlap(a, x_a, turn_a, b, x_b, turn_b).max())
-              for first, (shapes_a, x_a, turn_a) in enumerate(frames[: len(scene.bodies)])
-              for shapes_b, x_b, turn_b in frames[first + 1 :] for a in shapes_a for b in shapes_b]  # fmt: skip
-    return max([0.0, *depths])
+    frames: list[tuple[Any, Floats, Floats]] = [
+        (body.shapes, motion.position[::every, k], rotation(motion.orientation[::every, k]))
+        for k, body in enumerate(scene.bodies)]  # fmt: skip
+    frames += [(wall.shapes, np.array([wall.position]), rotation([wall.orientation])) for wall in scene.obstacles]
+    pairs = [(one, other) for k, one in enumerate(frames[: len(scene.bodies)]) for other in frames[k + 1 :]]
+    return max([0.0, *(float(_overlap(a, x_a, turn_a, b, x_b, turn_b).max()) for (shapes_a, x_a, turn_a),
+                       (shapes_b, x_b, turn_b) in pairs for a in shapes_a for b in shapes_b)])  # fmt: skip
 
 
 def _overlap(a: Sphere | Cuboid, x_a: Floats, turn_a: Floats, b: Sphere | Cuboid, x_b: Floats,

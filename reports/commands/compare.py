@@ -13,8 +13,7 @@ import numpy as np
 import typer
 
 from iapb.errors import ArgumentError
-from reference.datasets import problem_files
-from reference.fclib import write_fclib
+from reference.datasets import problem_files, write_fclib
 from reports.commands.as_json import Json, print_json
 from reports.commands.lines import sentence, table_lines
 from reports.commands.progress import stage_progress

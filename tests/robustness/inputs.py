@@ -31,8 +31,7 @@ from iapb.scene import Scene, find_scene, scene_folder
 from iapb.scene.document import Document
 from iapb.simulation import Simulation
 from reference.complementarity.problem import ImpactProblem
-from reference.datasets import read_problem
-from reference.fclib import _write_rows, write_fclib
+from reference.datasets import _write_rows, read_problem, write_fclib
 from reference.worlds import find_world
 from reports.cli import main
 from reports.commands.inspect import inspect

@@ -38,7 +38,7 @@ class SolverEntry:
 
 
 _HERE = "reference.complementarity.solvers"
-_PINOCCHIO, _SICONOS = f"{_HERE}.pinocchio_contact", f"{_HERE}.siconos"
+_PINOCCHIO, _SICONOS = f"{_HERE}.pinocchio_contact", "reference.siconos_bridge"
 
 SOLVERS: dict[str, SolverEntry] = {
     "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp", True),

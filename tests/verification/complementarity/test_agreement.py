@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
-from reference.fclib import write_fclib
+from reference.datasets import write_fclib
 from verification.complementarity.agreement import (
     SAME,
     agreement_map,

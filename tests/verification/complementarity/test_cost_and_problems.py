@@ -9,7 +9,7 @@ import pytest
 
 from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
-from reference.fclib import write_fclib
+from reference.datasets import write_fclib
 from verification.complementarity.findings import problems
 from verification.complementarity.problems import FACTORS, study_problems
 from verification.cost import step_cost
