@@ -66,20 +66,15 @@ def coordinates_of(simulation: Any) -> Coordinates:
 
 def _line_bytes(coordinates: Coordinates, contacts: int, trees: int) -> int:
     """Return the bytes of the lines of a step with so many contacts and trees."""
-    lines = _lines(1, coordinates, contacts, trees)
-    return sum(array.nbytes for arrays in lines.values() for array in arrays.values())
+    return sum(array.nbytes for array in make_record(1, coordinates, contacts, trees).arrays()[1:])
 
 
 def make_record(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> Any:
     """Allocate a record; `coordinates` = (nq, d, nq_t, d_t)."""
-    lines = _lines(steps, coordinates, contacts, trees)
-    return block(Record(np.zeros(3, np.int64), **{name: columns(f"{name}_lines", lines[name]) for name in LINES}))
-
-
-def _lines(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> dict[str, dict[str, NDArray[Any]]]:
     lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
     lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
-    return {name: blank(listed, lengths, np.empty) for name, listed in LINES.items()}
+    return block(Record(np.zeros(3, np.int64), **{
+        name: columns(f"{name}_lines", blank(listed, lengths, np.empty)) for name, listed in LINES.items()}))
 
 
 @kernel
@@ -104,13 +99,11 @@ def write_step(record, k, step, state, port):
     line.state[k] = contact_state(state, port.tool_tree)
     line.contact_count[k] = state.contact_count[0]
     record.used[0] = k + 1
-    _write_contacts(record, state)
-    if state.impacts.logged[0] > 0:
-        _write_impacts(record, step, state)
+    _write_tables(record, step, state)
 
 
 @kernel
-def _write_contacts(record, state):
+def _write_tables(record, step, state):
     line, contacts, m = record.contacts, state.contacts, record.used[1]
     for i in range(state.contact_count[0]):
         line.body_a[m], line.body_b[m] = contacts.body_a[i], contacts.body_b[i]
@@ -122,22 +115,18 @@ def _write_contacts(record, state):
         line.impulse[m], line.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
         m += 1
     record.used[1] = m
-
-
-@kernel
-def _write_impacts(record, step, state):
-    line, log = record.impacts, state.impacts
+    impact, log, m = record.impacts, state.impacts, record.used[2]
     for i in range(log.logged[0]):
-        m = record.used[2]
-        line.step[m], line.group[m] = step, log.group[i]
-        line.rows[m], line.rank[m] = log.rows[i], log.rank[i]
-        line.scale[m], line.clamp[m] = log.scale[i], log.clamp[i]
-        line.energy_lost[m], line.friction_share[m] = log.energy_lost[i], log.friction_share[i]
-        line.approaching[m], line.solved[m] = log.approaching[i], log.solved[i]
-        copy_into(line.v_minus[m], log.v_minus[i])
-        copy_into(line.v_plus[m], log.v_plus[i])
-        copy_into(line.impulse[m], log.impulse[i])
-        record.used[2] = m + 1
+        impact.step[m], impact.group[m] = step, log.group[i]
+        impact.rows[m], impact.rank[m] = log.rows[i], log.rank[i]
+        impact.scale[m], impact.clamp[m] = log.scale[i], log.clamp[i]
+        impact.energy_lost[m], impact.friction_share[m] = log.energy_lost[i], log.friction_share[i]
+        impact.approaching[m], impact.solved[m] = log.approaching[i], log.solved[i]
+        copy_into(impact.v_minus[m], log.v_minus[i])
+        copy_into(impact.v_plus[m], log.v_plus[i])
+        copy_into(impact.impulse[m], log.impulse[i])
+        m += 1
+    record.used[2] = m
 
 
 class Recorder:
@@ -152,7 +141,7 @@ class Recorder:
         port, state, system = simulation.port, simulation.state, simulation.system
         self.start = {"q": state.q.copy(), "v": state.v.copy(),
                       "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
-        self.coordinates = coordinates_of(simulation)  # lengths of q and v, of the scene and of the device
+        self.coordinates = coordinates_of(simulation)
         self._shape = self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
         self._line_bytes = _line_bytes(*self._shape)
         self.chunks: list[tuple[Any, int, float]] = []  # record, steps and seconds of each chunk held

@@ -66,16 +66,12 @@ INTERRUPTED = "interrupted"  # value of `Run.stopped` after Ctrl-C
 
 
 class Checkpoint(Protocol):
-    """An object that stores an unfinished run from time to time."""
+    """A function that stores an unfinished run; `due` says whether it should be stored now."""
 
     @property
-    def due(self) -> bool:
-        """Whether the run should be stored now."""
-        ...
+    def due(self) -> bool: ...
 
-    def __call__(self, run: Run) -> object:
-        """Store the run so far."""
-        ...
+    def __call__(self, run: Run) -> object: ...
 
 
 class Simulation:
@@ -103,8 +99,8 @@ class Simulation:
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
         if not isinstance(self.coupling, Coupling):
             raise ArgumentError("coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)")
-        self.system = scene if isinstance(scene, System) else System(
-            scene if isinstance(scene, Scene) else load_scene(find_scene(scene)))
+        scene = scene if isinstance(scene, Scene | System) else load_scene(find_scene(scene))
+        self.system = scene if isinstance(scene, System) else System(scene)
         self.scene = self.system.scene
         if isinstance(self.law, ImpulseAugmented | Penalty):
             self.law = self.law.within(self.scene)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -28,10 +28,10 @@ from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralC
 from iapb.haptics.kernels import PLANNED, Port
 from iapb.haptics.waveforms import waveform_weights
 from iapb.linalg import cholesky
-from iapb.mechanics.free_motion import make_free_motion
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.arrays import make_workspace
 from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.structure import make_free_motion
 from iapb.run import ImpactTable
 from iapb.scene import Scene, SpatialScene
 from iapb.scene.mechanism import (
@@ -51,6 +51,8 @@ _factored = Entry(cholesky)
 
 # Effects whose kernels are compiled only where they are on.
 _COMPILED = ("impact_friction", "unequal_restitution", "joint_damping")
+_CONTACT_NUMBERS = ("stiffness", "damping", "friction_velocity", "approach_velocity", "cluster_distance",
+                    "coherence_distance")
 
 
 class System:
@@ -64,7 +66,7 @@ class System:
     shapes, pairs : Shapes and their candidate pairs (k, 2); capacity : largest number of contacts
     tool_tree : int, index of the tree that the hand holds; −1 without a hand
     tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
-    dt : float [s]
+    dt : float [s]; tangents : of a contact, 1 in the plane, 2 in space
     restitutions : (r,) the distinct values of e among the pairs of shapes that can touch, ascending
     frictions : Frictions, of all pairs of shapes
     start : (q, v)
@@ -78,29 +80,24 @@ class System:
         self.mechanism: Mechanism = mechanism_of(scene)
         self.shapes = shapes_of(scene)
         self.pairs = pairs_of(scene, self.shapes)
-        self.stops = _stops(scene, self.mechanism, len(self.shapes.kind))
-        self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
+        arrays, stops = self.mechanism.arrays, np.array(stops_of(scene, self.mechanism)).reshape(-1, 5).T.copy()
+        body, parent = stops[:2].astype(np.int64)
+        self.stops = Stops(body, parent, len(self.shapes.kind) + np.arange(len(body), dtype=np.int64),
+                           arrays.q_start[body], arrays.v_start[body], *stops[2:])
+        self.capacity = contact_capacity(self.shapes, self.pairs) + len(body)
         self.joint_damping, self.start = joint_damping_of(scene), start_of(scene)
         self.restitutions, self.frictions = restitutions_of(scene, self.pairs), frictions_of(scene)
         self.dt = 1.0 / scene.rate
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
-        self.tool_tree = -1 if scene.hand is None else int(self.mechanism.tree_of_body[self._held_body()])
-        self.tool_dofs, self.tool_coordinates = self._tool_ranges()
+        self.tangents = 2 if isinstance(scene, SpatialScene) else 1
+        self.tool_tree, self.tool_dofs, self.tool_coordinates = -1, (0, 0), (0, 0)
+        if scene.hand is not None:
+            trees = self.mechanism.tree_of_body
+            self.tool_tree = int(trees[self.mechanism.index(scene.hand.body)])
+            start = int(arrays.q_start[np.argmax(trees == self.tool_tree)])
+            self.tool_dofs = self.mechanism.tree_dofs[self.tool_tree]
+            self.tool_coordinates = start, start + self.device_mechanism().nq
         self._worlds: dict[Any, tuple[World, Entry]] = {}
-
-    def _held_body(self) -> int:
-        if self.scene.hand is None:
-            raise ArgumentError("scene", self.scene.name, "a scene with a hand")
-        return self.mechanism.index(self.scene.hand.body)
-
-    def _tool_ranges(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        if self.tool_tree < 0:
-            return (0, 0), (0, 0)
-        bodies = np.flatnonzero(self.mechanism.tree_of_body == self.tool_tree)
-        start = int(self.mechanism.arrays.q_start[bodies[0]])
-        size = sum(self.mechanism.bodies[b].joint.layout.nq for b in bodies)
-        v_start, v_stop = self.mechanism.tree_dofs[self.tool_tree]
-        return (int(v_start), int(v_stop)), (start, start + size)
 
     def device_mechanism(self) -> Mechanism:
         """Return the mechanism of the device, which equals the tree in the hand (paper VI)."""
@@ -165,16 +162,13 @@ class System:
             broad_phase=make_broad_phase(self.shapes, self.pairs if switches.broad_phase else self.pairs[:0]),
             tree_of_body=mechanism.tree_of_body, tree_start=np.ascontiguousarray(ranges[:, 0]),
             tree_stop=np.ascontiguousarray(ranges[:, 1]), switches=switches, dt=self.dt, gravity=self.gravity,
-            stiffness=float(contact.stiffness), damping=float(contact.damping), clamped=contact.penalty == "clamped",
+            **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS}, clamped=contact.penalty == "clamped",
             friction_class=self.frictions.class_of_shape, friction=self.frictions.table,
             coulomb=flag("friction" in on and (contact.friction_law == "coulomb" or contact.forces == "implicit")),
-            implicit=flag(contact.forces == "implicit"), tangents=_tangents(scene),
-            friction_velocity=float(contact.friction_velocity),
+            implicit=flag(contact.forces == "implicit"), tangents=self.tangents,
             restitution=float(self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution),
-            own_restitution=restitution_by_shape(scene), approach_velocity=float(contact.approach_velocity),
-            cluster_distance=float(contact.cluster_distance), coherence_distance=float(contact.coherence_distance),
-            per_body_rows=contact.self_collision_rows == "per_body", joint_damping=self.joint_damping,
-            stops=self.stops, impulse_limit=limit,
+            own_restitution=restitution_by_shape(scene), per_body_rows=contact.self_collision_rows == "per_body",
+            joint_damping=self.joint_damping, stops=self.stops, impulse_limit=limit,
             stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
             semi_implicit=integrator.semi_implicit, conserving=integrator.conserving,
             free=make_free_motion(mechanism.arrays, mechanism.tree_of_body),
@@ -183,13 +177,16 @@ class System:
     def make_state(self) -> Any:
         """Return a new state at the scene's start."""
         scene, contact, mechanism, c = self.scene, self.scene.contact, self.mechanism, self.capacity
-        trees, d, tangents = len(mechanism.tree_dofs), mechanism.nv, _tangents(scene)
+        trees, d, tangents = len(mechanism.tree_dofs), mechanism.nv, self.tangents
         largest = max((stop - start for start, stop in mechanism.tree_dofs), default=0)
         per_body, implicit = contact.self_collision_rows == "per_body", contact.forces == "implicit"
         rows = c * (2 if per_body else 1)  # (13)-(14): two each
         rubbing = scene.largest_friction > 0.0
         sliding = rubbing and not per_body  # per-body rows have no slip, so no friction in impacts
         creeping = rubbing and contact.friction_law == "coulomb" and not implicit
+        log = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
+        for name, value in {"scale": 1, "clamp": 1, "friction_share": 1, "solved": 1, "approaching": -1}.items():
+            log[name][:] = value  # where a law written in Python does not set it
         state = State(
             **blank(quantities(State), {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows,
                                         "root": 9 * trees}),
@@ -199,21 +196,15 @@ class System:
             friction_work=make_friction_work(d * sliding, rows * sliding, tangents),
             step_friction=make_step_friction(d, c * creeping, tangents, largest),
             rest_work=make_rest_work(d * implicit, c * implicit, 1 + tangents, largest, trees),
-            impacts=_make_log(trees, d),
+            impacts=columns("ImpactLog", {"logged": np.zeros(1, np.int64), **log}),
         )
         state.q[:], state.v[:] = self.start
-        state.mass_matrix[:], state.lower[:] = self._mass_at_start
+        state.mass_matrix[:] = mechanism.mass_matrix(state.q)
+        if _factored(state.mass_matrix, state.lower):
+            raise ArgumentError("scene", scene.name, "bodies whose mass matrix is positive definite at the start")
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
         state.row_budget[0], state.located_q[:] = d, np.nan
         return block(state)
-
-    @cached_property
-    def _mass_at_start(self) -> tuple[Floats, Floats]:
-        mass = self.mechanism.mass_matrix(self.start[0])
-        lower = np.zeros_like(mass)
-        if _factored(mass, lower):
-            raise ArgumentError("scene", self.scene.name, "bodies whose mass matrix is positive definite at the start")
-        return mass, lower
 
     def make_port(self, coupling: Coupling, effects: Sequence[Effect] | None = None, external: bool = False) -> Any:
         """Return hand, coupling and device at the scene's start, the device at the tool's position and velocity.
@@ -239,26 +230,26 @@ class System:
             q_start=q_start, q_stop=q_stop, v_start=v_start, v_stop=v_stop,
             hand_body=-1 if hand is None else self.mechanism.index(hand.body),
             device_body=-1 if hand is None else device.index(hand.body),
-            mechanism=device.block, body=device.workspace(), varying_inertia=not device.has_constant_mass_matrix,
-            free=make_free_motion(device.arrays, device.tree_of_body), damped="device_damping" in on,
-            limited="device_limits" in on, quantised="quantisation" in on, pulsed=len(weights) > 1,
+            mechanism=device.block, body=make_workspace(len(device.bodies), device.nv),
+            varying_inertia=not device.has_constant_mass_matrix, damped="device_damping" in on,
+            free=make_free_motion(device.arrays, device.tree_of_body), limited="device_limits" in on,
+            quantised="quantisation" in on, pulsed=len(weights) > 1,
         )
         for name, values in coupling.settings.items():
             if len(values) != lengths["tool"]:  # else the kernels would read past the end
                 raise ArgumentError(f"coupling {name}", values,
                                     f"{lengths['tool']} values, one for each coordinate of the tool")
             getattr(port, name)[:] = values
-        q, v = (start[first:last] for start, first, last in zip(
-            self.start, (q_start, v_start), (q_stop, v_stop), strict=True))
-        port.device_q[:] = port.sensed_q[:] = port.measured_q[:] = q
-        port.device_v[:], port.pulse_weights[:], port.force_limit[:] = v, weights, np.inf
+        port.device_q[:] = port.sensed_q[:] = port.measured_q[:] = self.start[0][q_start:q_stop]
+        port.device_v[:] = self.start[1][v_start:v_stop]
+        port.pulse_weights[:], port.force_limit[:] = weights, np.inf
         if settings is not None:
             for array, values in ((port.force_limit, settings.force_limit),
                                   (port.device_damping, settings.damping if port.damped else None),
                                   (port.resolution, settings.position_resolution if port.quantised else None)):
                 array[:] = array if values is None else values
         if hand is not None:
-            port.device_mass[:] = device.mass_matrix(q)
+            port.device_mass[:] = device.mass_matrix(port.device_q)
             _factored(port.device_mass, port.device_lower)
             port.hand_point[: len(hand.point)] = hand.point
             port.wrench[:] = wrenches_of(scene, [0.0])[0]
@@ -291,39 +282,15 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
     """Return the coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table I)."""
     if name == "none":
         return NoCoupling()
-    kinds: dict[str, tuple[Callable[..., Coupling], Any]] = {
-        "four-channel": (FourChannel, scene.couplings.four_channel),
-        "unilateral": (UnilateralCoupler, scene.couplings.unilateral),
-    }
+    kinds: dict[str, type[FourChannel | UnilateralCoupler]] = {
+        "four-channel": FourChannel, "unilateral": UnilateralCoupler}
     if name not in kinds:
         raise ArgumentError("coupling", name, "one of none, four-channel, unilateral")
-    kind, gains = kinds[name]
+    field = name.replace("-", "_")
+    gains = getattr(scene.couplings, field)
     if gains is None:
-        raise ArgumentError("coupling", name, f"a scene with couplings.{name.replace('-', '_')}; "
-                                              f"{scene.name} gives no gains for it")
-    return kind(tuple(gains.stiffness), tuple(gains.damping))
-
-
-def _tangents(scene: Scene) -> int:
-    return 2 if isinstance(scene, SpatialScene) else 1
-
-
-def _stops(scene: Scene, mechanism: Mechanism, shapes: int) -> Stops:
-    """Return the joint limits as arrays; their numbers follow those of the `shapes`."""
-    found = stops_of(scene, mechanism)
-    body, parent = (np.array([getattr(stop, name) for stop in found], np.int64) for name in ("body", "parent"))
-    sign, bound, arm = (np.array([getattr(stop, name) for stop in found]) for name in ("sign", "bound", "arm"))
-    return Stops(body, parent, shapes + np.arange(len(found), dtype=np.int64), mechanism.arrays.q_start[body],
-                 mechanism.arrays.v_start[body], sign, bound, arm)
-
-
-def _make_log(trees: int, d: int) -> Any:
-    """Return an empty log with the defaults for fields that a law written in Python does not set."""
-    lines = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
-    for name in ("scale", "clamp", "friction_share", "solved"):
-        lines[name][:] = 1
-    lines["approaching"][:] = -1
-    return columns("ImpactLog", {"logged": np.zeros(1, np.int64), **lines})
+        raise ArgumentError("coupling", name, f"a scene with couplings.{field}; {scene.name} gives no gains for it")
+    return kinds[name](tuple(gains.stiffness), tuple(gains.damping))
 
 
 def wrenches_of(scene: Scene, times: Sequence[float]) -> Floats:

@@ -69,18 +69,9 @@ class SimulatedDevice:
         Force of the hand on the device [N, N m]; it may be set at any time.
     """
 
-    def __init__(
-        self,
-        mass_matrix: ArrayLike,
-        q: ArrayLike,
-        v: ArrayLike | None = None,
-        *,
-        dt: float,
-        damping: ArrayLike | None = None,
-        force_limit: ArrayLike | None = None,
-        delay: int = 0,
-        resolution: ArrayLike | None = None,
-    ) -> None:
+    def __init__(self, mass_matrix: ArrayLike, q: ArrayLike, v: ArrayLike | None = None, *, dt: float,
+                 damping: ArrayLike | None = None, force_limit: ArrayLike | None = None, delay: int = 0,
+                 resolution: ArrayLike | None = None) -> None:
         mass = np.array(mass_matrix, np.float64)
         size = len(mass) if mass.ndim else 0
         self._lower = np.zeros_like(mass)
@@ -95,9 +86,13 @@ class SimulatedDevice:
         if delay < 0:
             raise ArgumentError("delay", delay, "a number of steps >= 0")
         self._dt = float(dt)
-        self._damping = _per_coordinate("damping", damping, size, 0.0)
-        self._limit = _per_coordinate("force_limit", force_limit, size, np.inf)
-        self._resolution = _per_coordinate("resolution", resolution, size, 0.0)
+        given = {"damping": (damping, 0.0), "force_limit": (force_limit, np.inf), "resolution": (resolution, 0.0)}
+        vectors = []
+        for name, (values, default) in given.items():
+            vectors.append(np.full(size, default) if values is None else np.array(values, np.float64))
+            if vectors[-1].shape != (size,) or not np.all(vectors[-1] >= 0.0):
+                raise ArgumentError(name, values, f"{size} numbers >= 0")
+        self._damping, self._limit, self._resolution = vectors
         self._readings = deque([DeviceReading(self._sensed(), self.v.copy())] * (delay + 1), delay + 1)
         self._forces = deque([np.zeros(size)] * delay)
 
@@ -111,9 +106,8 @@ class SimulatedDevice:
         self._forces.append(np.clip(commanded, -self._limit, self._limit))
         total = self.hand_force + self._forces.popleft() - self._damping * self.v
         before = self._sensed()
-        acceleration = np.empty_like(total)
-        solve_mass(self._lower, total, acceleration)
-        self.v = self.v + self._dt * acceleration
+        solve_mass(self._lower, total, total)
+        self.v = self.v + self._dt * total
         self.q = self.q + self._dt * self.v
         sensed = self._sensed()
         velocity = np.where(self._resolution > 0.0, (sensed - before) / self._dt, self.v)
@@ -122,15 +116,6 @@ class SimulatedDevice:
     def _sensed(self) -> Floats:
         step = self._resolution
         return np.where(step > 0.0, np.round(self.q / np.where(step > 0.0, step, 1.0)) * step, self.q)
-
-
-def _per_coordinate(name: str, values: ArrayLike | None, size: int, default: float) -> Floats:
-    if values is None:
-        return np.full(size, default)
-    vector = np.array(values, np.float64)
-    if vector.shape != (size,) or not np.all(vector >= 0.0):
-        raise ArgumentError(name, values, f"{size} numbers >= 0")
-    return vector
 
 
 class DeviceLink:
@@ -178,12 +163,9 @@ class DeviceLink:
 
     def _read(self) -> None:
         reading = self.device.read()
-        _put("q", reading.q, self._port.device_q)
-        _put("v", reading.v, self._port.device_v)
-
-
-def _put(name: str, values: ArrayLike, target: Any) -> None:
-    read = np.asarray(values, np.float64)
-    if read.shape != target.shape or not np.all(np.isfinite(read)):
-        raise IapbError(f"the device read {name} = {values!r}: expected {len(target)} finite numbers")
-    target[:] = read
+        for name, target in (("q", self._port.device_q), ("v", self._port.device_v)):
+            values = getattr(reading, name)
+            read = np.asarray(values, np.float64)
+            if read.shape != target.shape or not np.all(np.isfinite(read)):
+                raise IapbError(f"the device read {name} = {values!r}: expected {len(target)} finite numbers")
+            target[:] = read

@@ -144,8 +144,7 @@ def couple(world, state, port):
 @kernel
 def feel_hand(world, state, port):
     """Write the hand's J_hᵀF_h on the tool and on the device, each at its own pose; zeros if the wrench is zero."""
-    port.hand_force[:] = 0.0
-    port.device_hand_force[:] = 0.0
+    port.hand_force[:] = port.device_hand_force[:] = 0.0
     pushing = False
     for k in range(port.wrench.shape[0]):
         pushing = pushing or port.wrench[k] != 0.0
@@ -181,9 +180,8 @@ def coordinate(state, port):
     difference(port.mechanism, state.q[port.q_start : port.q_stop], port.measured_q, port.error)
     for i in range(port.error.shape[0]):
         k = port.v_start + i
-        port.coupling_force[k] = port.stiffness[i] * port.error[i] + port.damping[i] * (
-            port.measured_v[i] - state.v[k]
-        )
+        rate = port.measured_v[i] - state.v[k]
+        port.coupling_force[k] = port.stiffness[i] * port.error[i] + port.damping[i] * rate
 
 
 # Rendering of an impulse over several steps, and the passivity observer that prevents an energy gain.
@@ -258,8 +256,7 @@ def command(port):
     now = port.clock[0] % slots
     for i in range(port.device_force.shape[0]):
         k = port.v_start + i
-        force = port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0
-        force -= port.coupling_force[k]
+        force = (port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0) - port.coupling_force[k]
         if port.limited:
             force = min(max(force, -port.force_limit[i]), port.force_limit[i])
         port.delayed_force[now, i] = force

@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
 from iapb.mechanics.joints import Joint
-
-Floats = NDArray[np.float64]
+from iapb.schema import Floats
 
 # A placement given with nine digits counts as a rotation; a coarser one would shear the body.
 ROTATION_TOLERANCE = 1e-8
@@ -91,8 +90,7 @@ class Body:
         center = finite_array(where + "center_of_mass", self.center_of_mass, (3,), "m")
         inertia = finite_array(where + "inertia", self.inertia, (3, 3), "kg m^2")
         if np.abs(rotation.T @ rotation - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
-            expected = "a rotation matrix (orthonormal, determinant +1)"
-            raise ArgumentError(where + "placement rotation", rotation, expected)
+            raise ArgumentError(where + "placement rotation", rotation, "a rotation matrix (orthonormal, det +1)")
         if np.abs(inertia - inertia.T).max() > SYMMETRY_TOLERANCE * np.abs(inertia).max():
             raise ArgumentError(where + "inertia", inertia, "a symmetric matrix [kg m^2]")
         if mass < 0.0:

@@ -17,18 +17,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
 from iapb.mechanics.mechanism import Mechanism, entries
 from iapb.run import Run
-
-Floats = NDArray[np.float64]
+from iapb.schema import Floats
 
 FORCES = ("hand", "coupling", "penalty", "friction")
 
 
-def port_energy(force: Floats, displacement: Floats, before: float | None = None) -> Floats:
+def port_energy(force: Floats, displacement: Floats, before: float = -0.0) -> Floats:
     """Return the energy (n,) [J] that has entered through a port by the end of each step: sum of F . Dq.
 
     This is the passivity observer of Hannaford and Ryu (2002) for force (n, d) and displacement (n, d); `before` is
@@ -37,9 +36,9 @@ def port_energy(force: Floats, displacement: Floats, before: float | None = None
     return _summed(np.einsum("nd,nd->n", force, displacement), before)
 
 
-def _summed(values: Floats, before: float | None) -> Floats:
-    """Return the running sums, added in order: a run summed in parts gives the same bits as a run summed at once."""
-    return np.cumsum(values) if before is None else np.cumsum(np.concatenate([[before], values]))[1:]
+def _summed(values: Floats, before: float = -0.0) -> Floats:
+    """Return the running sums, added in order: in parts or at once, with the same bits (−0.0 changes no sum)."""
+    return np.cumsum(np.append(before, values))[1:]
 
 
 def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -> Floats:
@@ -54,16 +53,9 @@ def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -
     return losses
 
 
-def energy_ledger(
-    mechanism: Mechanism,
-    gravity: ArrayLike,
-    q: Floats,
-    v: Floats,
-    forces: Mapping[str, Floats],
-    impulse: Floats,
-    before: Mapping[str, float] | None = None,
-    straight: bool = False,
-) -> dict[str, Floats]:
+def energy_ledger(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats, forces: Mapping[str, Floats],
+                  impulse: Floats, before: Mapping[str, float] | None = None, straight: bool = False,
+                  ) -> dict[str, Floats]:
     """Return the energy balance of n steps.
 
     Parameters
@@ -98,8 +90,8 @@ def energy_ledger(
             raise ArgumentError(f"{name} of shape", np.shape(force), str(displacement.shape))
     ledger = {"kinetic": kinetic, "potential": potential}
     for name, force in forces.items():
-        ledger[f"{name}_work"] = port_energy(force, displacement, before.get(f"{name}_work"))
-    ledger["impact_loss"] = _summed(impact_losses(mechanism, q, v, impulse), before.get("impact_loss"))
+        ledger[f"{name}_work"] = port_energy(force, displacement, before.get(f"{name}_work", -0.0))
+    ledger["impact_loss"] = _summed(impact_losses(mechanism, q, v, impulse), before.get("impact_loss", -0.0))
     total = kinetic + potential
     explained = sum((ledger[f"{name}_work"] for name in forces), -ledger["impact_loss"])
     ledger["integration_residual"] = total[1:] - before.get(_AT_FIRST, total[0]) - explained
@@ -120,10 +112,8 @@ def moved_straight(run: Run) -> bool:
     return run.law_settings.get("integrator") == "momentum"
 
 
-def energy_of_run(
-    run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None,
-    before: Mapping[str, float] | None = None,
-) -> dict[str, Floats]:
+def energy_of_run(run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None,
+                  before: Mapping[str, float] | None = None) -> dict[str, Floats]:
     """Return the energy balance of a run, or of its part after `before` (see `energy_ledger`), with the device.
 
     The device adds `device_kinetic` (n + 1,), `device_hand_work` (work of the hand's force on the device: the
@@ -135,5 +125,5 @@ def energy_of_run(
         moved = device.displacements(run.device_q)
         ledger["device_kinetic"], _ = device.energies(run.device_q, run.device_v, gravity)
         for name, force in (("hand", run.hand_force[:, slice(*run.tool_dofs)]), ("actuator", run.device_force)):
-            ledger[f"device_{name}_work"] = port_energy(force, moved, before.get(f"device_{name}_work"))
+            ledger[f"device_{name}_work"] = port_energy(force, moved, before.get(f"device_{name}_work", -0.0))
     return ledger

@@ -16,10 +16,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from iapb.schema import Floats
 
-Floats = NDArray[np.float64]
 Integrate = Callable[[Floats, Floats, float], Floats]  # q, v, dt [s] -> q
 Acceleration = Callable[[Floats, Floats], Floats]  # q, v -> dv/dt
 
@@ -39,9 +37,8 @@ class Integrator(NamedTuple):
     semi_implicit: bool = False  # the new velocity moves the configuration
     conserving: bool = False  # Coriolis terms belong to the motion, which keeps momentum; `step` leaves them out
 
-    def step(
-        self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
-    ) -> tuple[Floats, Floats]:
+    def step(self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float,
+             ) -> tuple[Floats, Floats]:
         """Return (q, v) after one step of dt [s]."""
         rate, change = v, acceleration(q, v)
         mean_rate, mean_change = self.weight[0] * rate, self.weight[0] * change

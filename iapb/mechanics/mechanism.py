@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.compiled import Block, Entry, block
 from iapb.errors import ArgumentError
@@ -21,28 +20,26 @@ from iapb.mechanics import structure
 from iapb.mechanics.bodies import Body, finite_array, float_array, parents_and_trees
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.kernels import configuration, dynamics, evaluation, kinematics
-from iapb.mechanics.kernels.arrays import Evaluation, MechanismArrays, Workspace, make_workspace
+from iapb.mechanics.kernels.arrays import Evaluation, MechanismArrays, make_workspace
 from iapb.mechanics.urdf import read_urdf
+from iapb.schema import Floats, Integers
 
 __all__ = ["Body", "Joint", "Mechanism"]
-
-Floats = NDArray[np.float64]
 
 # The kernels that Python calls, always with a mechanism's blocks and contiguous float arrays (see `Entry`).
 entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
     configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
-    evaluation.all_finite, evaluation.bias_at, evaluation.biases_at, evaluation.centroidal_momentum,
-    evaluation.displacements_along, evaluation.energies_along, evaluation.impact_loss, evaluation.mass_matrices_at,
-    evaluation.mass_matrix_at, evaluation.misplaced_body, evaluation.poses_along, evaluation.rows_along,
-    kinematics.forward_kinematics, kinematics.frame_jacobian)})
+    evaluation.all_finite, evaluation.biases_at, evaluation.centroidal_momentum, evaluation.displacements_along,
+    evaluation.energies_along, evaluation.impact_loss, evaluation.mass_matrices_at, evaluation.misplaced_body,
+    evaluation.poses_along, evaluation.rows_along, kinematics.forward_kinematics, kinematics.frame_jacobian)})
 
 
 class _Scratch(threading.local):
     """Scratch memory of the kernels, for all bodies and for the moving parts alone; each thread has its own."""
 
-    def __init__(self, mechanism: Mechanism, parts: MechanismArrays) -> None:
-        self.workspace: Block = block(mechanism.workspace())
-        self.parts: Block = block(Evaluation(parts, make_workspace(len(parts.kind), mechanism.nv)))
+    def __init__(self, bodies: int, dofs: int, parts: MechanismArrays) -> None:
+        self.workspace: Block = block(make_workspace(bodies, dofs))
+        self.parts: Block = block(Evaluation(parts, make_workspace(len(parts.kind), dofs)))
 
 
 class Mechanism:
@@ -90,11 +87,11 @@ class Mechanism:
         self.nq, self.nv = len(self.coordinate_names), len(self.velocity_names)
         self.arrays: MechanismArrays = structure.collect_arrays(self.bodies, parents)
         self.block: Any = block(self.arrays)
-        self.tree_of_body: NDArray[np.int64] = np.array(trees, np.int64)
+        self.tree_of_body: Integers = np.array(trees, np.int64)
         starts = self.arrays.v_start[np.flatnonzero(np.diff(self.tree_of_body, prepend=-1))].tolist()
         self.tree_dofs: list[tuple[int, int]] = list(zip(starts, [*starts[1:], self.nv], strict=False))
         parts = structure.moving_parts(self.arrays)
-        self._scratch = _Scratch(self, parts)
+        self._scratch = _Scratch(len(self.bodies), self.nv, parts)
         self._alone: dict[int, Mechanism] = {}
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(parts)
         self.has_velocity_terms: bool = structure.has_velocity_terms(parts)
@@ -115,10 +112,6 @@ class Mechanism:
         if isinstance(body, int | np.integer) and 0 <= body < len(self.bodies):
             return int(body)
         raise ArgumentError("body", body, f"a body name or an index below {len(self.bodies)}")
-
-    def workspace(self) -> Workspace:
-        """Return fresh scratch for the kernels."""
-        return make_workspace(len(self.bodies), self.nv)
 
     def alone(self, tree: int) -> Mechanism:
         """Return a mechanism of one tree alone; this is the mechanism itself if it has no other tree."""
@@ -158,10 +151,10 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        out = np.empty((self.nv, self.nv))
-        if not self._mass_matrix_at(self._scratch.parts, float_array("q", q, (self.nq,)), out):
-            self._place(q)
-        return out
+        place, out = float_array("q", q, (self.nq,)), np.empty((1, self.nv, self.nv))
+        if not entries.mass_matrices_at(self._scratch.parts, place[None], out):
+            self._place(place)
+        return out[0]
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
@@ -174,11 +167,11 @@ class Mechanism:
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
         place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
-        out = np.empty(self.nv)
-        if not self._bias_at(self._scratch.parts, place, rates, out):
+        out = np.empty((1, self.nv))
+        if not entries.biases_at(self._scratch.parts, place[None], rates[None], out):
             self._place(place)
             self._rates(rates)
-        return out
+        return out[0]
 
     def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
@@ -192,12 +185,12 @@ class Mechanism:
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
-        return self._filled((self.nv,), entries.gravity, self._at(q), _field(g))
+        return self._filled((self.nv,), entries.gravity, self._at(q), finite_array("g", g, (3,), "m/s^2"))
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
         """Return tau = M dv + B + G (d,)."""
-        rates, change = self._rates(v), self._rates(dv, "dv")
-        return self._filled((self.nv,), entries.inverse_dynamics, self._at(q), rates, change, _field(g))
+        given = self._at(q), self._rates(v), self._rates(dv, "dv"), finite_array("g", g, (3,), "m/s^2")
+        return self._filled((self.nv,), entries.inverse_dynamics, *given)
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
         """Return J (3, d): velocity, in world axes, of the world point [m] regarded as fixed to the body."""
@@ -227,8 +220,8 @@ class Mechanism:
     def energies(self, qs: ArrayLike, vs: ArrayLike, g: ArrayLike) -> tuple[Floats, Floats]:
         """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for the field g (3,)."""
         places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
-        kinetic, potential = np.zeros(len(places)), np.zeros(len(places))
-        entries.energies_along(self.block, self._scratch.workspace, places, rates, _field(g), kinetic, potential)
+        field, (kinetic, potential) = finite_array("g", g, (3,), "m/s^2"), np.zeros((2, len(places)))
+        entries.energies_along(self.block, self._scratch.workspace, places, rates, field, kinetic, potential)
         return kinetic, potential
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
@@ -264,14 +257,6 @@ class Mechanism:
         kernel(self.block, *given, out)
         return out
 
-    @cached_property
-    def _mass_matrix_at(self) -> Callable[..., bool]:
-        return entries.mass_matrix_at.taking(self._scratch.parts, np.empty(self.nq), np.empty((self.nv, self.nv)))
-
-    @cached_property
-    def _bias_at(self) -> Callable[..., bool]:
-        return entries.bias_at.taking(self._scratch.parts, np.empty(self.nq), np.empty(self.nv), np.empty(self.nv))
-
     def _rates(self, v: ArrayLike, name: str = "v") -> Floats:
         """Return a velocity (nv,) of finite numbers, or raise ArgumentError."""
         rates = float_array(name, v, (self.nv,))
@@ -293,7 +278,3 @@ class Mechanism:
             self._place(q, f"qs[{k}]")
         for k, v in enumerate(rates):
             self._rates(v, f"vs[{k}]")
-
-
-def _field(g: ArrayLike) -> Floats:
-    return finite_array("g", g, (3,), "m/s^2")

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.elementary import arc_tangent, hypotenuse, sine_cosine
-
-Floats = NDArray[np.float64]
+from iapb.schema import Floats
 
 
 def rotation_of(rpy: Any) -> Floats:

@@ -1,4 +1,4 @@
-"""Structure of a mechanism: its bodies as arrays, its moving parts alone, and which terms of its equations vanish.
+"""Structure of a mechanism: bodies as arrays, moving parts alone, terms that vanish, constants of its free motion.
 
 `has_constant_mass_matrix` and `has_velocity_terms` compare with exact zeros, not with thresholds: a centre of mass
 1e-17 m off its axis keeps the terms. A term reported as absent is exactly zero. A term reported as present may still
@@ -8,16 +8,17 @@ be zero in cases that are not checked, such as a balanced second link on a first
 from __future__ import annotations
 
 from collections.abc import Container
+from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iapb.compiled import flag
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
 from iapb.mechanics.kernels.arrays import MechanismArrays
-
-Floats = NDArray[np.float64]
+from iapb.mechanics.kernels.free_motion import LINKAGE, RIGID, STRAIGHT, FreeMotion
+from iapb.schema import Floats, Integers
 
 
 def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
@@ -79,19 +80,15 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         centers.append(center)
         inertias.append(sum((turned_inertia(own[b][0], m.inertia[b]) + m.mass[b] * point_inertia(place - center)
                              for b, place in zip(members, places, strict=True)), np.zeros((3, 3))))
+    same = ("kind", "q_start", "v_start", "v_count", "joint_axis", "last_dof")
     return m._replace(
-        kind=m.kind[moving],
+        **{name: getattr(m, name)[moving] for name in same},
         parent=np.array([new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64),
-        q_start=m.q_start[moving],
-        v_start=m.v_start[moving],
-        v_count=m.v_count[moving],
-        joint_axis=m.joint_axis[moving],
         placement_rotation=np.array([placed[b][0] for b in moving]).reshape(-1, 3, 3),
         placement_position=np.array([placed[b][1] for b in moving]).reshape(-1, 3),
         mass=np.array(masses, np.float64),
         center_of_mass=np.array(centers).reshape(-1, 3),
         inertia=np.array(inertias).reshape(-1, 3, 3),
-        last_dof=m.last_dof[moving],
         dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64),
     )
 
@@ -145,3 +142,55 @@ def _spins_without_bias(parts: MechanismArrays, b: int) -> bool:
         return True  # v = dq/dt: B follows from dM/dq alone
     inertia = parts.inertia[b] + parts.mass[b] * point_inertia(parts.center_of_mass[b])
     return bool((inertia == inertia[0, 0] * np.eye(3)).all())
+
+
+def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
+    """Return the constants of `iapb.mechanics.kernels.free_motion` for the trees, given as the tree of each body."""
+    count = 1 + int(tree_of_body.max())
+    found = FreeMotion(np.zeros(count, np.int64), np.full(count, -1, np.int64), np.zeros(count, np.int64),
+                       np.zeros((count, 3)), np.zeros((count, 3, 3)), np.ones((count, 3)), False, False)
+    parts, carriers = moving_parts(m), np.flatnonzero(m.v_count)
+    for t in range(count):
+        moving = np.flatnonzero(tree_of_body[carriers] == t).tolist()
+        if not moving:
+            continue
+        first = moving[0]
+        kind, center, inertia = int(parts.kind[first]), parts.center_of_mass[first], parts.inertia[first]
+        found.root[t] = carriers[first]
+        if len(moving) == 1 and kind in (FREE_FLYER, SPHERICAL):
+            found.kind[t] = RIGID
+            if kind == FREE_FLYER:
+                found.center[t] = center
+            else:
+                inertia = inertia + parts.mass[first] * point_inertia(center)
+            found.moments[t], axes = principal_axes(inertia)
+            found.axes[t] = axes.T
+        elif has_velocity_terms(parts, moving):
+            found.kind[t] = LINKAGE
+            if kind in (FREE_FLYER, PLANAR, SPHERICAL) and (parts.parent[moving[1:]] >= 0).all():
+                found.base[t] = parts.v_count[first]
+    return found._replace(turning=flag(bool((found.kind != STRAIGHT).any())),
+                          linked=flag(bool((found.kind == LINKAGE).any())))
+
+
+def principal_axes(inertia: Floats) -> tuple[Floats, Floats]:
+    """Return the principal moments, ascending, and the axes as columns of a rotation, by Jacobi's method.
+
+    Without LAPACK: the same bits on every processor.
+    """
+    matrix, axes = np.array(inertia, np.float64), np.eye(3)
+    for _ in range(30):
+        i, j = max(((0, 1), (0, 2), (1, 2)), key=lambda at: abs(matrix[at]))
+        if abs(matrix[i, j]) <= 1e-17 * (abs(matrix[i, i]) + abs(matrix[j, j])):
+            break
+        ratio = (matrix[j, j] - matrix[i, i]) / (2.0 * matrix[i, j])
+        t = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + sqrt(ratio * ratio + 1.0))
+        c = 1.0 / sqrt(t * t + 1.0)
+        s = t * c
+        for rows in (matrix.T, axes.T, matrix):
+            rows[i], rows[j] = c * rows[i] - s * rows[j], s * rows[i] + c * rows[j]
+    order = sorted(range(3), key=lambda k: matrix[k, k])
+    turned = np.ascontiguousarray(axes[:, order])
+    if float((np.cross(turned[:, 0], turned[:, 1]) * turned[:, 2]).sum()) < 0.0:
+        turned[:, 2] *= -1.0
+    return matrix[order, order], turned

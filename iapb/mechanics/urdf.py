@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
@@ -23,35 +22,26 @@ from iapb.mechanics.joints import Joint
 from iapb.mechanics.rotations import rotation_of
 from iapb.mechanics.structure import turned_inertia
 from iapb.names import one_of
+from iapb.schema import Floats
 
-Floats = NDArray[np.float64]
-
-KIND_OF_TYPE = {kind: kind for kind in ("fixed", "revolute", "continuous", "prismatic", "planar")}
-KIND_OF_TYPE["floating"] = "free_flyer"
 WITH_AXIS = ("revolute", "continuous", "prismatic")
+KIND_OF_TYPE = {**{kind: kind for kind in ("fixed", *WITH_AXIS, "planar")}, "floating": "free_flyer"}
 # geometry of a <collision> -> its attributes that are lengths, and how many numbers each holds
 LENGTHS = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1},
            "capsule": {"radius": 1, "length": 1}, "mesh": {}}
 
-# element: (children that are read, children of the format that are not, attributes; none: any)
-_FORMAT: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
-    "robot": (("link", "joint"), ("material", "transmission", "gazebo"), ()),
-    "link": (("inertial", "collision"), ("visual", "contact", "sensor"), ()),
-    "joint": (("origin", "parent", "child", "axis"),
-              ("calibration", "dynamics", "limit", "mimic", "safety_controller", "hardwareInterface"), ()),
-    "inertial": (("origin", "mass", "inertia"), (), ()),
-    "collision": (("origin", "geometry"), ("material", "verbose"), ()),
-    "geometry": (tuple(LENGTHS), (), ()),
-    "origin": ((), (), ("xyz", "rpy", "quat_xyzw")),
-    "mass": ((), (), ("value",)),
-    "inertia": ((), (), ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
-    "axis": ((), (), ("xyz",)),
-    "parent": ((), (), ("link",)),
-    "child": ((), (), ("link",)),
-    **{kind: ((), (), tuple(lengths)) for kind, lengths in LENGTHS.items() if lengths},
+# children that are read, and attributes, of the elements that have any
+_CHILDREN: dict[str, tuple[str, ...]] = {
+    "robot": ("link", "joint"), "link": ("inertial", "collision"), "joint": ("origin", "parent", "child", "axis"),
+    "inertial": ("origin", "mass", "inertia"), "collision": ("origin", "geometry"), "geometry": tuple(LENGTHS),
+}
+_ATTRIBUTES: dict[str, tuple[str, ...]] = {
+    "origin": ("xyz", "rpy", "quat_xyzw"), "mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "axis": ("xyz",), "parent": ("link",), "child": ("link",),
+    **{kind: tuple(lengths) for kind, lengths in LENGTHS.items() if lengths},
 }
 _MANY = ("link", "joint", "collision", *LENGTHS)  # an element may hold several of these
-_NEAR = 0.75  # share of letters that agree: inertail and colision are errors, contact is another word
+_NEAR = 0.75  # share of letters that agree: inertail and colision are errors, contact and visual are other words
 MAX_BYTES = 10_000_000  # the largest known robot file has a tenth of this
 MAX_DEPTH = 32  # of open elements: a URDF has five levels, a malicious file could nest without limit
 
@@ -76,10 +66,11 @@ def read_urdf(path: str | Path, floating_base: bool = False) -> list[Body]:
     held: dict[str, tuple[str, Joint, tuple[Floats, Floats]]] = {}  # link -> parent, joint and placement
     children: dict[str, list[str]] = {name: [] for name in inertials}
     for _, element in sorted(elements_by_name(robot, "joint").items(), key=lambda item: item[0].encode()):
-        where, parent, child = where_of(element), _end(element, "parent"), _end(element, "child")
-        for tag, link in (("parent", parent), ("child", child)):
+        where, ends = where_of(element), {tag: element.find(tag) for tag in ("parent", "child")}
+        parent, child = ("" if end is None else end.get("link", "") for end in ends.values())
+        for tag, link in zip(ends, (parent, child), strict=True):
             if link not in inertials:
-                raise ArgumentError(f"{where} {tag}", link, "the name of a <link>")
+                raise ArgumentError(f"{where} {tag}", link, f'<{tag} link="..."/> with the name of a <link>')
         if child in held:
             raise ArgumentError(f"{where} child", child, "a link that is the child of no other joint")
         held[child] = parent, _joint(element), origin_of(element, where)
@@ -129,28 +120,13 @@ def _joint(element: ElementTree.Element) -> Joint:
     return Joint(KIND_OF_TYPE[kind], (float(along[0]), float(along[1]), float(along[2])))
 
 
-def _end(joint: ElementTree.Element, tag: str) -> str:
-    """Return the link at an end of a joint."""
-    end = joint.find(tag)
-    link = end.get("link") if end is not None else None
-    if not link:
-        raise ArgumentError(f"{where_of(joint)} {tag}", link, f'<{tag} link="..."/>')
-    return link
-
-
 class CollisionShape(NamedTuple):
-    """One <collision> element of a link.
+    """One <collision> element of a link."""
 
-    kind : box, sphere, cylinder, capsule or mesh; the scene decides which of them it accepts
-    lengths : [m] full sides of a box (3,), radius of a sphere (1,), radius and length (2,) of cylinder and capsule;
-    a mesh has none
-    rotation, center : (3, 3) and (3,) [m] of the shape's own axes, in link axes
-    """
-
-    kind: str
-    lengths: Floats
-    rotation: Floats
-    center: Floats
+    kind: str  # box, sphere, cylinder, capsule or mesh; the scene decides which of them it accepts
+    lengths: Floats  # [m] sides of a box; radius of a sphere; radius and length of cylinder and capsule; none of a mesh
+    rotation: Floats  # (3, 3) of the shape's own axes, in link axes
+    center: Floats  # (3,) [m]
 
 
 def read_collisions(path: str | Path) -> dict[str, tuple[CollisionShape, ...]]:
@@ -236,21 +212,20 @@ def _check_spelling(element: ElementTree.Element, where: str) -> None:
     Elements of other tools (<gazebo>, <transmission>, <contact> …) are allowed, as the format intends. A name that
     nearly equals an element that is read counts as an error: otherwise a link could lose its mass without a message.
     """
-    read, others, attributes = _FORMAT.get(str(element.tag), ((), (), ()))
+    read, attributes = (table.get(str(element.tag), ()) for table in (_CHILDREN, _ATTRIBUTES))
     for name, value in element.attrib.items():
         if attributes and name not in attributes and not name.startswith("{"):  # {…}: of another XML namespace
             raise ArgumentError(f"{where} {name}", value, one_of(name, attributes, "one of its attributes: "))
     seen: set[str] = set()
     for child in element:
         tag = str(child.tag)
-        near = difflib.get_close_matches(tag, read, n=1, cutoff=_NEAR)
         if tag in seen and tag not in _MANY:
             raise ArgumentError(f"{where} <{tag}>", "given twice", "one of them")
-        if tag not in read and tag not in others and near:
-            raise ArgumentError(f"{where} <{tag}>", tag, f"<{near[0]}>; is it misspelt? Rename it if not")
         if tag in read:
             seen.add(tag)
             _check_spelling(child, where_of(child) if element.tag == "robot" else f"{where} {tag}")
+        elif near := difflib.get_close_matches(tag, read, n=1, cutoff=_NEAR):
+            raise ArgumentError(f"{where} <{tag}>", tag, f"<{near[0]}>; is it misspelt? Rename it if not")
 
 
 def elements_by_name(robot: ElementTree.Element, tag: str) -> dict[str, ElementTree.Element]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
@@ -101,25 +100,3 @@ def test_contacts_at_a_pose_are_those_within_the_margin() -> None:
     assert len(system.contacts_at([0.0, 5.0, 0.1], np.inf).gap) == 40
     with pytest.raises(ArgumentError, match="margin"):
         system.contacts_at([0.0, 5.0, 0.1], np.nan)
-
-
-def test_the_broad_phase_looks_at_the_pairs_of_its_world() -> None:
-    disc = {"joint": "planar", "mass": 1.0, "inertia": 2e-4, "shapes": [{"kind": "circle", "radius": 0.02}]}
-    many = next(n for n in range(99) if n * (n - 1) // 2 > WORTHWHILE_PAIRS + 1)
-    for n in (3, many):
-        scene = load_scene(find_scene("two_discs")).with_values({"bodies": [
-            disc | {"name": f"disc_{i}", "position": [0.1 * i, 0.0, 0.0]} for i in range(n)]})
-        whole, fewer = System(scene), System(scene)
-        fewer.pairs = np.ascontiguousarray(fewer.pairs[1:])  # as a caller that leaves pairs out
-        for system, left in ((whole, 0), (fewer, 1)):
-            world = system.world_under(Penalty())
-            assert len(world.pairs) == n * (n - 1) // 2 - left
-            assert world.switches.broad_phase == (n == many)
-            assert np.count_nonzero(world.broad_phase.allowed) == (len(world.pairs) if n == many else 0)
-
-
-def test_scenes_with_and_without_self_collisions_share_no_pairs() -> None:
-    scene = load_scene(find_scene("arm_obstacles"))
-    assert scene.contact.self_collisions
-    pairs = [len(System(each).pairs) for each in (scene, scene.with_values({"contact.self_collisions": False}))]
-    assert pairs[0] > pairs[1]

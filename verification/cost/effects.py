@@ -301,9 +301,9 @@ class Loop(RecordedLoop):
 
     def places(self) -> Floats:
         """Return points of the held body, or of all bodies without a hand, at the compared instants (n, k, 3) [m]."""
-        system = self.simulation.system
-        bodies = slice(None) if system.tool_tree < 0 else slice(system._held_body(), system._held_body() + 1)
-        return np.array([_points(system.mechanism, q, bodies) for q in self.q])
+        held = self.simulation.port.hand_body
+        bodies = slice(None) if held < 0 else slice(held, held + 1)
+        return np.array([_points(self.simulation.system.mechanism, q, bodies) for q in self.q])
 
     def device_places(self) -> Floats:
         """Return positions of the device's bodies at the compared instants (n, k, 3) [m]; empty without a device."""

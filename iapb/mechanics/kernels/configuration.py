@@ -17,31 +17,11 @@ SMALL_ANGLE = 1e-4
 
 
 @kernel
-def screw_coefficients(angle):
-    """Return ((1 - cos t) / t^2, (t - sin t) / t^3) of the angle t."""
-    square = angle * angle
-    if angle < SMALL_ANGLE:
-        return 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
-    half = sine(0.5 * angle)
-    return 2.0 * half * half / square, (angle - sine(angle)) / (square * angle)
-
-
-@kernel
 def turn_vector(x, y, z, s, a):
     """Rotate a by the unit quaternion (x, y, z, s)."""
     axis = (x, y, z)
     twice = scale(2.0, cross(axis, a))
     return add(a, add(scale(s, twice), cross(axis, twice)))
-
-
-@kernel
-def turn_pair(q, i, angle, out):
-    """(cos, sin) at i <- turned by the angle, length restored to one."""
-    sin, cos = sine_cosine(angle)
-    c = q[i] * cos - q[i + 1] * sin
-    s = q[i + 1] * cos + q[i] * sin
-    length = sqrt(c * c + s * s)
-    out[i], out[i + 1] = c / length, s / length
 
 
 @kernel
@@ -63,10 +43,19 @@ def turn_quaternion(q, i, phi, out):
 
 @kernel
 def integrate_free_flyer(q, i, v, k, dt, out):
-    """p += R (1 + A [phi]x + B [phi]x^2) u with u = v_linear dt, phi = v_angular dt; R turns by phi."""
+    """p += R (1 + A [phi]x + B [phi]x^2) u with u = v_linear dt, phi = v_angular dt; R turns by phi, t = |phi|.
+
+    A = (1 - cos t) / t^2, B = (t - sin t) / t^3.
+    """
     u = (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt)
     phi = (v[k + 3] * dt, v[k + 4] * dt, v[k + 5] * dt)
-    first, second = screw_coefficients(sqrt(dot(phi, phi)))
+    angle = sqrt(dot(phi, phi))
+    square = angle * angle
+    if angle < SMALL_ANGLE:
+        first, second = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    else:
+        half = sine(0.5 * angle)
+        first, second = 2.0 * half * half / square, (angle - sine(angle)) / (square * angle)
     turned = cross(phi, u)
     path = add(u, add(scale(first, turned), scale(second, cross(phi, turned))))
     path = turn_vector(q[i + 3], q[i + 4], q[i + 5], q[i + 6], path)
@@ -85,7 +74,10 @@ def integrate_body(m, b, q, v, dt, out):
     """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity v."""
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
     if kind == CONTINUOUS:
-        turn_pair(q, i, v[k] * dt, out)
+        sin, cos = sine_cosine(v[k] * dt)
+        c, s = q[i] * cos - q[i + 1] * sin, q[i + 1] * cos + q[i] * sin
+        length = sqrt(c * c + s * s)
+        out[i], out[i + 1] = c / length, s / length
     elif kind == SPHERICAL:
         turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
     elif kind == FREE_FLYER:

@@ -6,19 +6,7 @@ composite's own centre of mass, where merging two bodies only adds positive term
 """
 
 from iapb.compiled import kernel
-from iapb.linalg import (
-    accumulate,
-    add,
-    cross,
-    dot,
-    load,
-    scale,
-    store,
-    store_columns,
-    subtract,
-    transform,
-    transform_back,
-)
+from iapb.linalg import accumulate, add, cross, dot, load, scale, store, subtract, transform, transform_back
 from iapb.mechanics.joints import FREE_FLYER
 
 
@@ -30,7 +18,10 @@ def turned_inertia(m, w, b, omega):
 
 @kernel
 def composite_bodies(m, w):
-    """Write, for each body, mass, centre and inertia of the body and all bodies that it carries."""
+    """Write, for each body, mass, centre and inertia of the body and all bodies that it carries.
+
+    Two bodies together have the inertia I1 + I2 + mu (|r|^2 1 - r r^T), mu = m1 m2 / (m1 + m2).
+    """
     for b in range(m.kind.shape[0]):
         w.composite_mass[b] = m.mass[b]
         store(w.composite_center, b, load(w.center, b))
@@ -39,27 +30,25 @@ def composite_bodies(m, w):
         image_x, image_y, image_z = transform(m.inertia, b, x), transform(m.inertia, b, y), transform(m.inertia, b, z)
         xx, yy, zz = dot(x, image_x), dot(y, image_y), dot(z, image_z)
         xy, xz, yz = dot(x, image_y), dot(x, image_z), dot(y, image_z)
-        store_columns(w.composite_inertia, b, (xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        own = w.composite_inertia[b]
+        store(own, 0, (xx, xy, xz))
+        store(own, 1, (xy, yy, yz))
+        store(own, 2, (xz, yz, zz))
     for b in range(m.kind.shape[0] - 1, -1, -1):
-        if m.parent[b] >= 0:
-            merge_composite(w, m.parent[b], b)
-
-
-@kernel
-def merge_composite(w, into, b):
-    """Add the composite of b to another: I = I1 + I2 + mu (|r|^2 1 - r r^T), mu = m1 m2 / (m1 + m2)."""
-    m1, m2 = w.composite_mass[into], w.composite_mass[b]
-    total = m1 + m2
-    center = load(w.composite_center, into)
-    r = subtract(load(w.composite_center, b), center)
-    share = m2 / total if total > 0.0 else 0.0
-    mu, square, inertia, own = m1 * share, dot(r, r), w.composite_inertia[into], w.composite_inertia[b]
-    xy, xz, yz = -mu * (r[0] * r[1]), -mu * (r[0] * r[2]), -mu * (r[1] * r[2])
-    accumulate(inertia, 0, add(load(own, 0), (mu * (square - r[0] * r[0]), xy, xz)))
-    accumulate(inertia, 1, add(load(own, 1), (xy, mu * (square - r[1] * r[1]), yz)))
-    accumulate(inertia, 2, add(load(own, 2), (xz, yz, mu * (square - r[2] * r[2]))))
-    w.composite_mass[into] = total
-    store(w.composite_center, into, add(center, scale(share, r)))
+        into = m.parent[b]
+        if into >= 0:
+            m1, m2 = w.composite_mass[into], w.composite_mass[b]
+            total = m1 + m2
+            center = load(w.composite_center, into)
+            r = subtract(load(w.composite_center, b), center)
+            share = m2 / total if total > 0.0 else 0.0
+            mu, square, inertia, own = m1 * share, dot(r, r), w.composite_inertia[into], w.composite_inertia[b]
+            xy, xz, yz = -mu * (r[0] * r[1]), -mu * (r[0] * r[2]), -mu * (r[1] * r[2])
+            accumulate(inertia, 0, add(load(own, 0), (mu * (square - r[0] * r[0]), xy, xz)))
+            accumulate(inertia, 1, add(load(own, 1), (xy, mu * (square - r[1] * r[1]), yz)))
+            accumulate(inertia, 2, add(load(own, 2), (xz, yz, mu * (square - r[2] * r[2]))))
+            w.composite_mass[into] = total
+            store(w.composite_center, into, add(center, scale(share, r)))
 
 
 @kernel
@@ -149,6 +138,8 @@ def inverse_dynamics(m, w, v, dv, g, out):
     (u, s) for v, (u', s') for dv:
     alpha = alpha_p + omega_p x s + s',
     a = a_p + alpha_p x r + omega_p x (omega_p x r + 2 u) + u' [+ s x u, velocities in body axes].
+    Then, with r = c - p and the inertia I in body axes, f = m (a + alpha x r + omega x (omega x r)) and
+    n = R (I R^T alpha + R^T omega x I R^T omega) + r x f about p.
     """
     for b in range(m.kind.shape[0]):
         parent = m.parent[b]
@@ -168,24 +159,14 @@ def inverse_dynamics(m, w, v, dv, g, out):
         store(w.angular_velocity, b, omega)
         store(w.angular_acceleration, b, alpha)
         store(w.linear_acceleration, b, a)
-        newton_euler(m, w, b, omega, alpha, a)
+        r = subtract(load(w.center, b), load(w.position, b))
+        f = scale(m.mass[b], add(a, add(cross(alpha, r), cross(omega, cross(omega, r)))))
+        own_omega, own_alpha = transform_back(w.rotation, b, omega), transform_back(w.rotation, b, alpha)
+        h = transform(m.inertia, b, own_omega)
+        n = transform(w.rotation, b, add(transform(m.inertia, b, own_alpha), cross(own_omega, h)))
+        store(w.force, b, f)
+        store(w.moment, b, add(n, cross(r, f)))
     project_forces(m, w, out)
-
-
-@kernel
-def newton_euler(m, w, b, omega, alpha, a):
-    """Write force and moment, about the origin of b, that give body b its motion; a: acceleration of this origin.
-
-    With r = c - p: f = m (a + alpha x r + omega x (omega x r)) and, the inertia I being given in body axes,
-    n = R (I R^T alpha + R^T omega x I R^T omega) + r x f.
-    """
-    r = subtract(load(w.center, b), load(w.position, b))
-    f = scale(m.mass[b], add(a, add(cross(alpha, r), cross(omega, cross(omega, r)))))
-    own_omega, own_alpha = transform_back(w.rotation, b, omega), transform_back(w.rotation, b, alpha)
-    h = transform(m.inertia, b, own_omega)
-    n = transform(w.rotation, b, add(transform(m.inertia, b, own_alpha), cross(own_omega, h)))
-    store(w.force, b, f)
-    store(w.moment, b, add(n, cross(r, f)))
 
 
 @kernel

@@ -41,41 +41,25 @@ def misplaced_body(m, q):
 
 
 @kernel
-def mass_matrix_at(at, q, out):
-    """out (d, d) <- M(q); return False if q is not a valid configuration."""
-    if misplaced_body(at.mechanism, q) >= 0:
-        return False
-    forward_kinematics(at.mechanism, q, at.workspace)
-    mass_matrix(at.mechanism, at.workspace, out)
-    return True
-
-
-@kernel
-def bias_at(at, q, v, out):
-    """out (d,) <- B(q, v); return False if q is not a valid configuration or v not finite."""
-    if misplaced_body(at.mechanism, q) >= 0 or not all_finite(v):
-        return False
-    forward_kinematics(at.mechanism, q, at.workspace)
-    bias(at.mechanism, at.workspace, v, out)
-    return True
-
-
-@kernel
 def mass_matrices_at(at, q, out):
-    """out (n, d, d) <- M at each row of q (n, nq); return False if one is not valid."""
-    valid = True
+    """out (n, d, d) <- M at each row of q (n, nq); return False at the first that is not valid."""
     for k in range(q.shape[0]):
-        valid = valid and mass_matrix_at(at, q[k], out[k])
-    return valid
+        if misplaced_body(at.mechanism, q[k]) >= 0:
+            return False
+        forward_kinematics(at.mechanism, q[k], at.workspace)
+        mass_matrix(at.mechanism, at.workspace, out[k])
+    return True
 
 
 @kernel
 def biases_at(at, q, v, out):
-    """out (n, d) <- B at each row of q (n, nq) and v (n, d); return False if one is not valid."""
-    valid = True
+    """out (n, d) <- B at each row of q (n, nq) and v (n, d); return False at the first that is not valid."""
     for k in range(q.shape[0]):
-        valid = valid and bias_at(at, q[k], v[k], out[k])
-    return valid
+        if misplaced_body(at.mechanism, q[k]) >= 0 or not all_finite(v[k]):
+            return False
+        forward_kinematics(at.mechanism, q[k], at.workspace)
+        bias(at.mechanism, at.workspace, v[k], out[k])
+    return True
 
 
 @kernel

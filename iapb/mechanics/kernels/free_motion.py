@@ -24,20 +24,7 @@ import numpy as np
 
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
-from iapb.linalg import (
-    add,
-    column,
-    cross,
-    dot,
-    dot_of,
-    load,
-    scale,
-    solve_mass,
-    store,
-    subtract,
-    transform,
-    transform_back,
-)
+from iapb.linalg import add, cross, dot, load, scale, solve_mass, store, subtract, transform, transform_back
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
 from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
 
@@ -56,7 +43,7 @@ class FreeMotion(NamedTuple):
     root: np.ndarray  # (t,) int64 first body that moves, −1 = none
     base: np.ndarray  # (t,) int64 number of root velocities with a conserved momentum
     center: np.ndarray  # (t, 3) centre of mass of a RIGID tree [m]; zero if it turns about its origin
-    axes: np.ndarray  # (t, 3, 3) its principal axes as columns, both in the root's axes
+    axes: np.ndarray  # (t, 3, 3) its principal axes as rows, both in the root's axes
     moments: np.ndarray  # (t, 3) its principal moments [kg m²] about centre or origin, ascending
     turning: bool  # whether any tree is RIGID or a LINKAGE
     linked: bool  # whether any tree is a LINKAGE
@@ -66,9 +53,9 @@ class FreeMotion(NamedTuple):
 def turn_freely(free, t, q, i, v, k, dt):
     """Turn the quaternion at q[i] and the spin at v[k] of the RIGID tree t for dt [s]; R l stays as it is."""
     axes, I = free.axes, (free.moments[t, 0], free.moments[t, 1], free.moments[t, 2])
-    omega = transform_back(axes, t, (v[k], v[k + 1], v[k + 2]))
+    omega = transform(axes, t, (v[k], v[k + 1], v[k + 2]))
     l0, l1, l2 = I[0] * omega[0], I[1] * omega[1], I[2] * omega[2]
-    turn_quaternion(q, i, transform(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q)
+    turn_quaternion(q, i, transform_back(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q)
     first, third = 1.0 / I[0] - 1.0 / I[1], 1.0 / I[2] - 1.0 / I[1]
     if first != 0.0 or third != 0.0:
         turn = dt * sqrt(dot(omega, omega))
@@ -78,13 +65,13 @@ def turn_freely(free, t, q, i, v, k, dt):
             h = dt if single else dt / parts * (1.0 - 2.0 * YOSHIDA if part % 3 == 1 else YOSHIDA)
             for half in range(2):
                 angle = 0.5 * h * first * l0
-                turn_quaternion(q, i, scale(angle, column(axes, t, 0)), q)
+                turn_quaternion(q, i, scale(angle, load(axes[t], 0)), q)
                 l1, l2 = turned_back(angle, l1, l2)
                 if half == 0:
                     angle = h * third * l2
-                    turn_quaternion(q, i, scale(angle, column(axes, t, 2)), q)
+                    turn_quaternion(q, i, scale(angle, load(axes[t], 2)), q)
                     l0, l1 = turned_back(angle, l0, l1)
-    v[k], v[k + 1], v[k + 2] = transform(axes, t, (l0 / I[0], l1 / I[1], l2 / I[2]))
+    v[k], v[k + 1], v[k + 2] = transform_back(axes, t, (l0 / I[0], l1 / I[1], l2 / I[2]))
 
 
 @kernel
@@ -225,7 +212,9 @@ def keep_momentum_and_energy(mass, lower, start, stop, base, p, energy, v, scrat
     """
     block = lower[start : start + base, start : start + base]
     solve_mass(block, p[:base], scratch[:base])
-    carried = 0.5 * dot_of(p[:base], scratch[:base])
+    carried = 0.0
+    for i in range(base):
+        carried += 0.5 * p[i] * scratch[i]
     solve_root(mass, block, start, stop, base, p, v)
     own = -carried
     for i in range(start, stop):

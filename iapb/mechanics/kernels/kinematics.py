@@ -2,33 +2,8 @@
 
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
-from iapb.linalg import (
-    add,
-    column,
-    cross,
-    dot,
-    load,
-    scale,
-    store,
-    store_columns,
-    subtract,
-    transform,
-    turn_frame,
-)
+from iapb.linalg import add, column, cross, load, scale, store, store_columns, subtract, transform, turn_frame
 from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL
-
-
-@kernel
-def place_joint_frame(m, w, b):
-    """Body b's frame <- its joint frame: R = R_parent R_placement, p = p_parent + R_parent p_placement."""
-    parent, offset, fixed = m.parent[b], load(m.placement_position, b), m.placement_rotation
-    x, y, z = column(fixed, b, 0), column(fixed, b, 1), column(fixed, b, 2)
-    if parent >= 0:
-        R = w.rotation
-        x, y, z = transform(R, parent, x), transform(R, parent, y), transform(R, parent, z)
-        offset = add(load(w.position, parent), transform(R, parent, offset))
-    store_columns(w.rotation, b, x, y, z)
-    store(w.position, b, offset)
 
 
 @kernel
@@ -86,26 +61,27 @@ def move_joint(m, q, w, b):
 
 
 @kernel
-def is_placed(q, w):
-    """Return whether the workspace holds exactly this q already; always False if there are no coordinates."""
-    for k in range(q.shape[0]):
-        if q[k] != w.placed_q[k]:
-            return False
-    return q.shape[0] > 0
-
-
-@kernel
 def forward_kinematics(m, q, w):
     """Fill rotation, position, center and axis of the workspace w for the configuration q, unless w holds q already.
 
-    Quaternions and (cos, sin) pairs must have length one; kernels do not check.
+    Quaternions and (cos, sin) pairs must have length one; kernels do not check. A joint frame has
+    R = R_parent R_placement, p = p_parent + R_parent p_placement.
     """
-    if is_placed(q, w):
-        return
+    placed = q.shape[0] > 0
     for k in range(q.shape[0]):
+        placed = placed and q[k] == w.placed_q[k]
         w.placed_q[k] = q[k]
+    if placed:
+        return
+    R, fixed = w.rotation, m.placement_rotation
     for b in range(m.kind.shape[0]):
-        place_joint_frame(m, w, b)
+        parent, offset = m.parent[b], load(m.placement_position, b)
+        x, y, z = column(fixed, b, 0), column(fixed, b, 1), column(fixed, b, 2)
+        if parent >= 0:
+            x, y, z = transform(R, parent, x), transform(R, parent, y), transform(R, parent, z)
+            offset = add(load(w.position, parent), transform(R, parent, offset))
+        store_columns(R, b, x, y, z)
+        store(w.position, b, offset)
         if m.kind[b] != FIXED:
             move_joint(m, q, w, b)
         store(w.center, b, add(load(w.position, b), transform(w.rotation, b, load(m.center_of_mass, b))))
@@ -144,8 +120,9 @@ def add_point_force(m, w, body, point, force, out):
     """
     if body < 0:
         return
-    x, f = (point[0], point[1], point[2]), (force[0], force[1], force[2])
+    place = (point[0], point[1], point[2])
     k = m.last_dof[body]
     while k >= 0:
-        out[k] += dot(motion_at(m, w, k, x), f)
+        x, y, z = motion_at(m, w, k, place)
+        out[k] += x * force[0] + y * force[1] + z * force[2]
         k = m.dof_parent[k]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.haptics.kernels import command, couple, observe_work, shape_impulse
 from iapb.scene import find_scene, load_scene, scene_from_text
@@ -93,25 +93,6 @@ def test_in_space_the_hand_does_the_work_of_its_wrench_at_the_held_point() -> No
         assert np.any(port.hand_force[start:stop] != 0.0)
 
 
-@pytest.mark.parametrize("delay", [0, 1, 3])
-def test_the_device_is_known_late_and_its_actuators_act_late(delay: int) -> None:
-    """What is measured was so `delay` steps ago, or at the start; a force of now is given `delay` steps later."""
-    world, state, port, rng = started(f", delay: {delay}", rendering="saturate")
-    known, asked = [], []
-    for step in range(9):
-        port.clock[0] = step
-        port.device_q[:], port.device_v[:] = rng.normal(size=3), rng.normal(size=3)
-        known.append((port.device_q.copy(), port.device_v.copy()))
-        couple(world, state, port)
-        q, v = known[max(step - delay, 0)]
-        np.testing.assert_array_equal(port.measured_q, q)
-        np.testing.assert_array_equal(port.measured_v, v)
-        port.environment_force[:] = rng.normal(size=6) * 100.0
-        command(port)
-        asked.append(np.clip(port.environment_force[3:] - port.coupling_force[3:], -LIMIT, LIMIT))
-        np.testing.assert_array_equal(port.device_force, asked[step - delay] if step >= delay else np.zeros(3))
-
-
 def test_unilateral_actuators_give_the_coupler_alone_and_without_limits_all_of_it() -> None:
     for coupling, share in ((FourChannel(*GAINS), 1.0), (UnilateralCoupler(*GAINS), 0.0)):
         _, _, port, rng = started(coupling=coupling)
@@ -152,27 +133,3 @@ def test_an_impulse_comes_in_the_shares_of_its_waveform_or_waits_while_it_would_
         balance -= world.dt * given @ (port.device_v - 0.5 * world.dt * port.acceleration)
         assert port.pulse_balance[0] == pytest.approx(balance, abs=1e-9)
     assert 0 < held < steps
-
-
-RESOLUTION = np.array([1e-3, 2e-3, 0.0])
-COUPLING = FourChannel((100.0, 100.0, 0.5), (70.0, 70.0, 0.375))
-
-
-def test_readings_are_whole_steps_and_velocities_their_differences() -> None:
-    scene = load_scene(find_scene("peg_corner")).with_values({"device.position_resolution": RESOLUTION.tolist()})
-    system = System(scene)
-    world, state, port = system.world_under(Penalty()), system.make_state(), system.make_port(COUPLING)
-    fine, rng = RESOLUTION > 0.0, np.random.default_rng(0)
-    before = port.device_q.copy()
-    for step in range(4):
-        port.device_q[:] += rng.uniform(-5e-3, 5e-3, 3)
-        port.device_v[:] = rng.normal(size=3)
-        port.clock[0] = step  # `drive_device` counts the steps; here nothing moves but by hand
-        couple(world, state, port)
-        read, steps = port.measured_q, np.round(port.device_q[fine] / RESOLUTION[fine])
-        assert read[fine] / RESOLUTION[fine] == pytest.approx(steps, abs=1e-9)
-        assert np.all(read[~fine] == port.device_q[~fine])
-        differences = (read - before) / world.dt
-        expected = np.where(fine & (step > 0), differences, port.device_v)  # the first reading has none to differ from
-        assert port.measured_v == pytest.approx(expected, abs=1e-9)
-        before = read.copy()

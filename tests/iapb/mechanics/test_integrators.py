@@ -82,9 +82,3 @@ def test_a_step_of_a_linear_system_is_the_methods_polynomial(method):
 def test_a_wrong_weight_is_seen_as_a_lower_order():
     wrong = Integrator("wrong midpoint", 2, 2, (0.0, 0.5), (0.1, 0.9))
     assert measured_order(double_pendulum(), wrong) < 2.0 - 3.0 * ORDER_TOLERANCE
-
-
-@pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
-def test_weights_and_stages_are_consistent(method):
-    assert sum(method.weight) == pytest.approx(1.0, abs=1e-15)
-    assert method.fraction[0] == 0.0 and len(method.fraction) == len(method.weight)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from iapb.mechanics.structure import moving_parts
 from reference.random_mechanisms import random_mechanism, random_state
 
 INERTIA = np.diag([0.1, 0.2, 0.3])
@@ -70,18 +69,6 @@ def test_a_no_is_always_true(seed, joints):
         assert change <= 1e-10 * size
     if not mechanism.has_velocity_terms:
         assert force <= 1e-10 * size
-
-
-def test_only_bodies_that_move_are_left() -> None:
-    base = Body("base", None, Joint("fixed"), mass=5.0)
-    arm = Body("arm", "base", Joint("revolute"), (np.eye(3), (1.0, 0, 0)), 1.0, (0.5, 0, 0))
-    flange = Body("flange", "arm", Joint("fixed"), (np.eye(3), (1.0, 0, 0)), 3.0, (0.5, 0, 0))
-    tool = Body("tool", "flange", Joint("prismatic", (1, 0, 0)), (np.eye(3), (0.5, 0, 0)), 1.0)
-    parts = moving_parts(Mechanism([base, arm, flange, tool]).arrays)
-    assert list(parts.parent) == [-1, 0] and list(parts.mass) == [4.0, 1.0]
-    np.testing.assert_allclose(parts.center_of_mass[0], [(0.5 + 3 * 1.5) / 4, 0, 0], rtol=1e-15)
-    np.testing.assert_allclose(parts.placement_position, [[1.0, 0, 0], [1.5, 0, 0]], rtol=1e-15)
-    np.testing.assert_allclose(parts.inertia[0][1, 1], 0.75, rtol=1e-15)  # 1 * 3 / (1 + 3) kg at 1 m
 
 
 def test_a_mechanism_that_cannot_move_has_an_empty_mass_matrix() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.mechanics.free_motion import principal_axes
+from iapb.mechanics.structure import principal_axes
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.mechanism import mechanism_of
