@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Indices = NDArray[np.int32]
 Booleans = NDArray[np.bool_]
 States = NDArray[np.int8]
-_TYPES: dict[Any, type] = {Floats: np.float64, Integers: np.int64, Booleans: np.bool_, States: np.int8}
 
 
 class Quantity(NamedTuple):
@@ -48,8 +48,8 @@ def quantities(record: type, first: str = "") -> tuple[Quantity, ...]:
 def _declared(record: Any) -> tuple[Quantity, ...]:
     hints = get_type_hints(record, include_extras=True)
     found = ((name, *get_args(hint)) for name, hint in hints.items() if hasattr(hint, "__metadata__"))
-    return tuple((along(said) if isinstance(said, str) else said)._replace(name=name, dtype=_TYPES[kind])
-                 for name, kind, said in found)
+    return tuple((along(said) if isinstance(said, str) else said)._replace(
+        name=name, dtype=get_args(get_args(kind)[1])[0]) for name, kind, said in found)
 
 
 def blank(listed: Iterable[Quantity], lengths: Mapping[str, int],

@@ -144,7 +144,7 @@ class Start:
     def slips(self, i: int) -> Floats:
         """Jacobian rows of contact i across its normal: one in the plane, two in space."""
         n = self.found.normal[i]
-        across = frame_along("normal", n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
+        across = frame_along(n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
         return self.rows_along(np.full(len(across), i), across)
 
     @cached_property

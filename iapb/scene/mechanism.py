@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact import geometry
-from iapb.contact.geometry import Shapes, candidate_pairs
+from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
 from iapb.elementary import sine_cosine
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
@@ -111,36 +111,36 @@ def shapes_of(scene: Scene) -> Shapes:
 
     A shape of a body that cannot move (all joints between it and the world are fixed) is static, like a wall.
     """
-    n, make = (3, geometry.make_spatial_shapes) if isinstance(scene, SpatialScene) else (2, geometry.make_shapes)
-    parents, described = _parents(scene), []
+    space = isinstance(scene, SpatialScene)
+    n, parents, made = 3 if space else 2, _parents(scene), []
     for body, _, shape in _owned_shapes(scene):
         rotation, shift, link = np.eye(n), np.zeros(n), body
         while link >= 0 and scene.bodies[link].joint == "fixed":
             turn = _turn(scene.bodies[link])
             rotation, shift = product(turn, rotation), product(turn, shift) + scene.bodies[link].origin
             link = parents[link]
-        described.append(_described(shape, -1, rotation, shift) if link < 0 else
-                         _described(shape, body, np.eye(n), np.zeros(n)))
-    return make(described)
+        made.append(_placed(shape, -1, rotation, shift) if link < 0 else _placed(shape, body, np.eye(n), np.zeros(n)))
+    return make_shapes(made, space)
 
 
-def _described(shape: Any, body: int, rotation: Floats, shift: Floats) -> Any:
-    """Return a shape of the scene as the narrow phase's class of shape, turned and shifted into the body's frame."""
+def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.Shape:
+    """Return a shape of the scene, turned and shifted into the body's frame."""
     if shape.kind == "half_plane":
-        return geometry.HalfPlane(shape.point, shape.normal)
+        normal = np.array(shape.normal) / math.hypot(*shape.normal)
+        return geometry.Shape(geometry.HALF_PLANE, vertices=[shape.point, normal])
     if shape.kind == "half_space":
-        return geometry.HalfSpace(shape.point, shape.normal)
+        return geometry.Shape(geometry.HALF_SPACE, center=shape.point, axes=frame_along(np.array(shape.normal)))
     center = product(rotation, shape.center) + shift
     if shape.kind == "circle":
-        return geometry.Circle(shape.radius, center, body)
+        return geometry.Shape(geometry.CIRCLE, body, shape.radius, [center], [*center, 0.0])
     if shape.kind == "sphere":
-        return geometry.Sphere(shape.radius, center, body)
+        return geometry.Shape(geometry.SPHERE, body, shape.radius, center=center)
     turn = product(rotation, _turn(shape))
     if len(turn) == 3:
-        return geometry.SpatialBox(shape.size, center, turn, body)
+        return geometry.Shape(geometry.BOX, body, center=center, axes=turn, half_size=0.5 * np.array(shape.size))
     corners = shape.vertices if shape.kind == "polygon" else 0.5 * np.array(
         [[-1, -1], [1, -1], [1, 1], [-1, 1]]) * shape.size
-    return geometry.Polygon(product(corners, turn.T) + center, body)
+    return geometry.Shape(geometry.POLYGON, body, vertices=product(corners, turn.T) + center)
 
 
 def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:

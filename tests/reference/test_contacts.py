@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.contact.geometry import SpatialBox, candidate_pairs, make_spatial_shapes
+from iapb.contact.geometry import BOX, Shape, candidate_pairs, make_shapes
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene import find_scene
@@ -25,7 +25,7 @@ def test_boxes_in_space_overlap_as_coal_says() -> None:
         axes = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)] + [np.eye(3)])
         axes[:2] *= np.sign(np.linalg.det(axes[:2]))[:, None, None]
         origins = np.array([np.zeros(3), rng.normal(scale=0.6, size=3), np.zeros(3)])
-        shapes = make_spatial_shapes([SpatialBox(size, body=k) for k, size in enumerate(sizes)])
+        shapes = make_shapes([Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True)
         found = find_contacts(shapes, candidate_pairs(shapes), axes, origins, 0.0)
         (one, other), result = (coal.Box(*size) for size in sizes), coal.CollisionResult()
         poses = [coal.Transform3s(axes[k], origins[k]) for k in range(2)]

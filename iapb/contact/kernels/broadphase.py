@@ -10,78 +10,67 @@ The pairs keep the order of the candidate pairs, so a scene gives the same bits 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.compiled import flag, kernel
-from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE, POLYGON, SPHERE, Integers, Shapes
+from iapb.contact.geometry import ENDLESS, HALF_SPACE, POLYGON, Shapes
+from iapb.schema import Floats, Indices, Integers, States, blank, quantities
 
 # Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant pairs early.
 WORTHWHILE_PAIRS = 150
 # Pairs kept per shape: bounding spheres of equal, closely packed shapes overlap about a dozen neighbours.
 PAIRS_PER_SHAPE = 40
 
-Floats = NDArray[np.float64]
-
 
 class BroadPhase(NamedTuple):
     """Bounding spheres of n shapes, k of them moving, and the scratch of the grid."""
 
-    moving: Integers  # (k,) shapes on moving bodies
-    static: Integers  # (n - k,)
-    body: Integers  # (n,)
-    allowed: NDArray[np.int8]  # (n, n) for i < j: 1 candidate pair (i, j), 2 candidate pair (j, i), 0 none
-    local_center: Floats  # (n, 3) [m] of the bounding sphere in the body's frame
-    radius: Floats  # (n,) [m], infinite for half-planes and half-spaces
+    moving: Indices  # (k,) shapes on moving bodies
+    static: Indices  # (n - k,)
+    body: Indices  # (n,)
+    allowed: Annotated[States, "shape shape"]  # for i < j: 1 candidate pair (i, j), 2 candidate pair (j, i), 0 none
+    local_center: Annotated[Floats, "shape 3"]  # [m] of the bounding sphere in the body's frame
+    radius: Annotated[Floats, "shape"]  # [m], infinite for half-planes and half-spaces
     cell_size: float  # [m] largest diameter of a moving shape
     neighbours: int  # cells to look at: 9 in the plane, 27 in space
-    center: Floats  # (n, 3) [m] world; those of static shapes are constant
-    cell: NDArray[np.int64]  # (k, 3)
-    bucket: NDArray[np.int64]  # (k,)
-    start: NDArray[np.int64]  # (buckets + 1,)
-    sorted: NDArray[np.int64]  # (k,)
-    key: NDArray[np.int64]  # (capacity,)
-    pairs: Integers  # (capacity, 2) output
+    center: Annotated[Floats, "shape 3"]  # [m] world; those of static shapes are constant
+    cell: Annotated[Integers, "moving 3"]
+    bucket: Annotated[Integers, "moving"]
+    start: Annotated[Integers, "bucket"]  # one more than there are buckets
+    sorted: Annotated[Integers, "moving"]
+    key: Annotated[Integers, "pair"]
+    pairs: Annotated[Indices, "pair 2"]  # output
     used: Any  # `iapb.compiled.flag`
 
 
-def make_broad_phase(shapes: Shapes, pairs: Integers) -> BroadPhase:
+def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
     """Return the broad phase of the candidate pairs (k, 2); without pairs (broad phase off) it is a stub."""
     n = len(shapes.kind) if len(pairs) else 0
-    allowed = np.zeros((n, n), np.int8)
+    moving, static = (np.flatnonzero(each).astype(np.int32) for each in (shapes.body[:n] >= 0, shapes.body[:n] < 0))
+    lengths = {"shape": n, "moving": len(moving), "bucket": (1 << (2 * len(moving)).bit_length()) + 1,
+               "pair": max(1, min(len(pairs), PAIRS_PER_SHAPE * n))}
+    arrays = blank(quantities(BroadPhase), lengths)
     for a, b in pairs:
-        allowed[min(a, b), max(a, b)] = 1 if a < b else 2
-    bounds = [_bounding_sphere(shapes, i) for i in range(n)]
-    local = np.array([center for center, _ in bounds]).reshape(n, 3)
-    radius = np.array([extent for _, extent in bounds], np.float64)
-    moving = np.flatnonzero(shapes.body[:n] >= 0).astype(np.int32)
-    static = np.flatnonzero(shapes.body[:n] < 0).astype(np.int32)
-    k = len(moving)
-    capacity = max(1, min(len(pairs), PAIRS_PER_SHAPE * n))
-    wholes = {name: np.zeros(size, np.int64) for name, size in (
-        ("bucket", k), ("start", (1 << (2 * k).bit_length()) + 1), ("sorted", k), ("key", capacity))}
+        arrays["allowed"][min(a, b), max(a, b)] = 1 if a < b else 2
+    for i in range(n):
+        arrays["local_center"][i], arrays["radius"][i] = _bounding_sphere(shapes, i)
+    arrays["center"][:] = arrays["local_center"]
     return BroadPhase(
-        moving=moving, static=static, body=shapes.body[:n].copy(), allowed=allowed, local_center=local,
-        radius=radius, cell_size=float(2.0 * radius[moving].max(initial=0.0)) or 1.0, center=local.copy(),
-        neighbours=27 if np.any(shapes.kind >= HALF_SPACE) else 9,
-        cell=np.zeros((k, 3), np.int64), pairs=np.zeros((capacity, 2), np.int32), used=flag(len(pairs) > 0), **wholes,
-    )
+        moving, static, shapes.body[:n].copy(), **arrays, used=flag(len(pairs) > 0),
+        cell_size=float(2.0 * arrays["radius"][moving].max(initial=0.0)) or 1.0,
+        neighbours=27 if np.any(shapes.kind >= HALF_SPACE) else 9)
 
 
-def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Floats, float]:
+def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Any, float]:
     """Return the centre in the body's frame and the radius [m]: of the box around a polygon, exact for others."""
-    kind = int(shapes.kind[i])
-    if kind in (HALF_PLANE, HALF_SPACE):
-        return np.zeros(3), np.inf
-    if kind in (CIRCLE, POLYGON):
-        corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
-        middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-        reach = max(math.hypot(x, y) for x, y in (corners - middle).tolist())
-        return np.array([*middle, 0.0]), reach + float(shapes.radius[i])
-    extent = float(shapes.radius[i]) if kind == SPHERE else math.hypot(*shapes.half_size[i].tolist())
-    return shapes.center[i].copy(), extent
+    if shapes.kind[i] != POLYGON:
+        endless = shapes.kind[i] in ENDLESS
+        return shapes.center[i], math.inf if endless else float(shapes.radius[i]) + math.hypot(*shapes.half_size[i])
+    corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    return [*middle, 0.0], max(math.hypot(*corner) for corner in corners - middle)
 
 
 LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cell and its neighbours
@@ -93,7 +82,9 @@ def near_pairs(broad, R, p, margin):
     place_bounds(broad, R, p)
     fill_buckets(broad, margin)
     count = moving_pairs(broad, margin)
-    count = static_pairs(broad, margin, count)
+    for i in broad.moving:
+        for j in broad.static:
+            count = keep_pair(broad, i, j, margin, count)
     if count > 0:
         sort_keys(broad.key, count)
         shapes = broad.radius.shape[0]
@@ -167,27 +158,12 @@ def moving_pairs(broad, margin):
                 if n <= m or broad.cell[n, 0] != x or broad.cell[n, 1] != y or broad.cell[n, 2] != z:
                     continue
                 count = keep_pair(broad, broad.moving[m], broad.moving[n], margin, count)
-                if count < 0:
-                    return -1
-    return count
-
-
-@kernel
-def static_pairs(broad, margin, count):
-    """Append the pairs of a moving and a static shape."""
-    if count < 0:
-        return -1
-    for i in broad.moving:
-        for j in broad.static:
-            count = keep_pair(broad, i, j, margin, count)
-            if count < 0:
-                return -1
     return count
 
 
 @kernel
 def keep_pair(broad, i, j, margin, count):
-    """Append the pair if it is a candidate and its bounding spheres overlap; those of unbounded shapes always do."""
+    """Append the pair if it is a candidate and its bounding spheres overlap; return the new count, -1: no room."""
     if i > j:
         i, j = j, i
     if broad.allowed[i, j] == 0:
@@ -198,7 +174,7 @@ def keep_pair(broad, i, j, margin, count):
         square += apart * apart
     if square > reach * reach:
         return count
-    if count >= broad.key.shape[0]:
+    if not 0 <= count < broad.key.shape[0]:
         return -1
     broad.key[count] = i * broad.radius.shape[0] + j
     return count + 1

@@ -21,7 +21,6 @@ from iapb.contact.kernels.passive import passive_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
 from iapb.contact.kernels.rows import (
     body_row,
-    contact_row,
     contact_velocities,
     direction_row,
     friction_of,
@@ -72,11 +71,11 @@ def gather_rows(world, state, island, size):
             continue
         if world.per_body_rows and contacts.body_b[i] >= 0 and not is_stop(contacts, i):
             for body in (contacts.body_a[i], contacts.body_b[i]):
-                body_row(world.mechanism, state.body, body, contacts.point[i], contacts.normal[i], state.row)
+                body_row(world.mechanism, state.body, body, contacts, i, state.row)
                 _store_row(state, size, i, count)
                 count += 1
         else:
-            contact_row(world.mechanism, state.body, contacts, i, state.row)
+            direction_row(world.mechanism, state.body, contacts, i, load(contacts.normal, i), state.row)
             _store_row(state, size, i, count)
             count += 1
     return count
@@ -102,7 +101,7 @@ def gather_restitution(world, state, count):
     contacts, smallest, largest = state.contacts, 1.0, 0.0
     for r in range(count):
         i = state.rows[r]
-        e = pair_restitution(world.own_restitution, contacts.shape_a[i], contacts.shape_b[i], world.restitution)
+        e = pair_restitution(world, contacts, i)
         state.row_restitution[r] = e
         smallest, largest = min(smallest, e), max(largest, e)
     return smallest, smallest < largest
@@ -306,9 +305,8 @@ def strike_again(world, state):
         copy_contact(now, i, contacts, i)
     contact_velocities(world.mechanism, state.body, state.v, now, count)
     for i in range(count):
-        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
-                                 state.group_of_tree)
-        e = pair_restitution(world.own_restitution, contacts.shape_a[i], contacts.shape_b[i], world.restitution)
+        group = group_of_contact(world, contacts, i, state.group_of_tree)
+        e = pair_restitution(world, contacts, i)
         if (group >= 0 and state.state_of_tree[group] == COLLIDING and contacts.gap[i] <= 0.0 and e > 0.0
                 and now.normal_velocity[i] < -world.approach_velocity):
             contacts.mark[i], contacts.collides[i], some = STRIKES, True, True

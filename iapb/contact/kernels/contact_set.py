@@ -31,12 +31,9 @@ def squared_distance(first, i, second, j):
 
 @kernel
 def same_surface(first, i, second, j, cosine):
-    """Return whether both contacts have the same two bodies, in either order, and aligned normals."""
-    aligned = dot(load(first.normal, i), load(second.normal, j))
-    a, b = first.body_a[i], first.body_b[i]
-    if a == second.body_a[j] and b == second.body_b[j]:
-        return aligned >= cosine
-    return a == second.body_b[j] and b == second.body_a[j] and -aligned >= cosine
+    """Return whether both contacts have the same two bodies, which come in one order always, and aligned normals."""
+    return (first.body_a[i] == second.body_a[j] and first.body_b[i] == second.body_b[j]
+            and dot(load(first.normal, i), load(second.normal, j)) >= cosine)
 
 
 @kernel
@@ -46,10 +43,9 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
     Contacts are visited deepest first. A contact is kept unless a deeper kept contact of its surface is closer than
     `distance`. So kept contacts of a surface are at least `distance` apart; they keep their order.
     """
-    if not _any_near(contacts, count, distance, cosine):
+    if count < 2:
         return count
     contacts.mark[:count] = _UNDECIDED
-    kept = 0
     while True:
         deepest = -1
         for i in range(count):
@@ -58,42 +54,17 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
         if deepest < 0:
             break
         contacts.mark[deepest] = _KEPT
-        kept += 1
         for i in range(count):
-            if contacts.mark[i] == _UNDECIDED and _is_near(contacts, deepest, i, distance, cosine):
+            if (contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i, cosine)
+                    and squared_distance(contacts, deepest, contacts, i) < distance * distance):
                 contacts.mark[i] = _DROPPED
-    if kept < count:
-        _close_ranks(contacts, count)
+    kept = 0
+    for i in range(count):
+        if contacts.mark[i] == _KEPT:
+            if kept < i:  # nothing but the geometry is computed before clustering
+                copy_contact(contacts, kept, contacts, i)
+            kept += 1
     return kept
-
-
-@kernel
-def _is_near(contacts, i, j, distance, cosine):
-    """Return whether two contacts are on one surface and closer than `distance`."""
-    near = squared_distance(contacts, i, contacts, j) < distance * distance
-    return near and same_surface(contacts, i, contacts, j, cosine)
-
-
-@kernel
-def _any_near(contacts, count, distance, cosine):
-    """Return whether any two contacts collapse; usually none do, and this test is cheaper than the clustering."""
-    for i in range(count):
-        for j in range(i):
-            if _is_near(contacts, i, j, distance, cosine):
-                return True
-    return False
-
-
-@kernel
-def _close_ranks(contacts, count):
-    """Move the kept contacts to the front; only their geometry, as nothing else is computed before clustering."""
-    row = 0
-    for i in range(count):
-        if contacts.mark[i] != _KEPT:
-            continue
-        if row < i:
-            copy_contact(contacts, row, contacts, i)
-        row += 1
 
 
 @kernel
@@ -121,44 +92,48 @@ def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED
 
 
 @kernel
+def _same_name(first, i, second, j):
+    """Return whether shapes and feature of two contacts are the same."""
+    return (first.shape_a[i] == second.shape_a[j] and first.shape_b[i] == second.shape_b[j]
+            and first.feature[i] == second.feature[j])
+
+
+@kernel
 def _is_same(contacts, i, previous, j, distance, cosine):
-    if (
-        contacts.shape_a[i] == previous.shape_a[j]
-        and contacts.shape_b[i] == previous.shape_b[j]
-        and contacts.feature[i] == previous.feature[j]
-    ):
+    if _same_name(contacts, i, previous, j):
         return True
     if distance == 0.0 or is_stop(contacts, i) or is_stop(previous, j):
         return False
-    if not same_surface(contacts, i, previous, j, cosine):
-        return False
-    return squared_distance(contacts, i, previous, j) <= distance * distance
+    return (same_surface(contacts, i, previous, j, cosine)
+            and squared_distance(contacts, i, previous, j) <= distance * distance)
 
 
 @kernel
 def contact_before(state, i, begin):
     """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
-    now, before, total = state.contacts, state.previous, state.contact_count[1]
+    total = state.contact_count[1]
     for k in range(total):
         j = begin + k if begin + k < total else begin + k - total
-        if (now.shape_a[i] == before.shape_a[j] and now.shape_b[i] == before.shape_b[j]
-                and now.feature[i] == before.feature[j]):
+        if _same_name(state.contacts, i, state.previous, j):
             return j
     return -1
 
 
 @kernel
-def moving_tree(body, tree_of_body, tree_start, tree_stop):
+def moving_tree(world, body):
     """Return the tree of a body that can move, else -1: the static world and bodies fixed to it do not link groups."""
     if body < 0:
         return -1
-    tree = tree_of_body[body]
-    return tree if tree_stop[tree] > tree_start[tree] else -1
+    tree = world.tree_of_body[body]
+    return tree if world.tree_stop[tree] > world.tree_start[tree] else -1
 
 
 @kernel
-def join(group_of_tree, a, b):
-    """Merge the groups of two trees; the root of a group is its smallest tree."""
+def join(world, contacts, i, group_of_tree):
+    """Merge the groups of the trees of contact i if both can move; the root of a group is its smallest tree."""
+    a, b = moving_tree(world, contacts.body_a[i]), moving_tree(world, contacts.body_b[i])
+    if a < 0 or b < 0:
+        return
     while group_of_tree[a] != a:
         a = group_of_tree[a]
     while group_of_tree[b] != b:
@@ -167,69 +142,52 @@ def join(group_of_tree, a, b):
 
 
 @kernel
-def link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree):
-    """Write group_of_tree, the first tree of each tree's group; contacts between moving trees link groups."""
-    for t in range(group_of_tree.shape[0]):
-        group_of_tree[t] = t
-    for i in range(count):
-        if contacts.body_b[i] < 0 or not contacts.gap[i] <= 0.0:
-            continue
-        a = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
-        b = moving_tree(contacts.body_b[i], tree_of_body, tree_start, tree_stop)
-        if a >= 0 and b >= 0:
-            join(group_of_tree, a, b)
-    for t in range(group_of_tree.shape[0]):
-        group_of_tree[t] = group_of_tree[group_of_tree[t]]  # smaller trees are settled already
-
-
-@kernel
-def group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree):
+def group_of_contact(world, contacts, i, group_of_tree):
     """Return the group of a contact, -1 if neither of its bodies can move."""
-    tree = moving_tree(contacts.body_a[i], tree_of_body, tree_start, tree_stop)
+    tree = moving_tree(world, contacts.body_a[i])
     if tree < 0:
-        tree = moving_tree(contacts.body_b[i], tree_of_body, tree_start, tree_stop)
+        tree = moving_tree(world, contacts.body_b[i])
     return group_of_tree[tree] if tree >= 0 else -1
 
 
 @kernel
-def classify(
-    contacts, count, tree_of_body, tree_start, tree_stop, approach_velocity, spreading, group_of_tree, state_of_tree
-):
+def classify(world, state, count):
     """Write the groups, the state of each (free, colliding, resting) and the contacts that collide.
 
-    Only contacts with gap <= 0 count. A contact approaches if v_n < −approach_velocity [m/s]. A group collides if one
-    of its *new* contacts approaches, or if any contact approaches while an impulse is still being spread. Then every
-    approaching contact of the group, new or old, enters the impact.
-
-    contacts : is_new and normal_velocity up to date; collides is written
-    spreading (t,) bool : trees with an unfinished impulse; cleared if the group no longer collides
-    group_of_tree (t,), state_of_tree (t,) : written, the state for every tree of the group
+    Contacts between moving trees link groups. Only contacts with gap <= 0 count. A contact approaches if
+    v_n < −approach_velocity [m/s]. A group collides if one of its *new* contacts approaches, or if any contact
+    approaches while an impulse is still being spread. Then every approaching contact of the group, new or old, enters
+    the impact. `spreading`, trees with an unfinished impulse, is cleared if the group no longer collides.
     """
-    link_groups(contacts, count, tree_of_body, tree_start, tree_stop, group_of_tree)
-    trees = group_of_tree.shape[0]
+    contacts, groups, states, spreading = state.contacts, state.group_of_tree, state.state_of_tree, state.spreading
+    trees, approaching = groups.shape[0], False
     for t in range(trees):
-        state_of_tree[t] = FREE
-        if spreading[t]:
-            spreading[group_of_tree[t]] = True
-    approaching = False
+        groups[t], states[t] = t, FREE
     for i in range(count):
-        group = group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree)
-        collides = contacts.gap[i] <= 0.0 and contacts.normal_velocity[i] < -approach_velocity
+        if contacts.gap[i] <= 0.0:
+            join(world, contacts, i, groups)
+    for t in range(trees):
+        groups[t] = groups[groups[t]]  # smaller trees are settled already
+        if spreading[t]:
+            spreading[groups[t]] = True
+    for i in range(count):
+        group = group_of_contact(world, contacts, i, groups)
+        collides = contacts.gap[i] <= 0.0 and contacts.normal_velocity[i] < -world.approach_velocity
         contacts.collides[i] = collides
         approaching = approaching or collides
         if contacts.gap[i] > 0.0 or group < 0:
             continue
         if collides and (contacts.is_new[i] or spreading[group]):
-            state_of_tree[group] = COLLIDING
-        elif state_of_tree[group] == FREE:
-            state_of_tree[group] = RESTING
+            states[group] = COLLIDING
+        elif states[group] == FREE:
+            states[group] = RESTING
     for i in range(count if approaching else 0):
-        group = group_of_contact(contacts, i, tree_of_body, tree_start, tree_stop, group_of_tree)
-        if group < 0 or state_of_tree[group] != COLLIDING:
+        group = group_of_contact(world, contacts, i, groups)
+        if group < 0 or states[group] != COLLIDING:
             contacts.collides[i] = False
     for t in range(trees):
-        state_of_tree[t] = state_of_tree[group_of_tree[t]]
-        if state_of_tree[t] != COLLIDING:
+        states[t] = states[groups[t]]
+        if states[t] != COLLIDING:
             spreading[t] = False
 
 
@@ -252,27 +210,23 @@ def find_islands(world, state):
         state.collides_of_tree[t] = False
     if not any_collides:
         return False
-    contacts, start, stop = state.contacts, world.tree_start, world.tree_stop
+    contacts, islands = state.contacts, state.island_of_tree
     for i in range(state.contact_count[0]):
-        a = moving_tree(contacts.body_a[i], world.tree_of_body, start, stop)
-        b = moving_tree(contacts.body_b[i], world.tree_of_body, start, stop)
-        if contacts.collides[i] and a >= 0 and b >= 0:
-            join(state.island_of_tree, a, b)
-    for t in range(start.shape[0]):
-        state.island_of_tree[t] = state.island_of_tree[state.island_of_tree[t]]  # smaller trees are settled already
+        if contacts.collides[i]:
+            join(world, contacts, i, islands)
+    for t in range(islands.shape[0]):
+        islands[t] = islands[islands[t]]  # smaller trees are settled already
     for i in range(state.contact_count[0]):
         if contacts.collides[i] and (not world.implicit or contacts.mark[i] == STRIKES):
-            state.collides_of_tree[
-                group_of_contact(contacts, i, world.tree_of_body, start, stop, state.island_of_tree)
-            ] = True
+            state.collides_of_tree[group_of_contact(world, contacts, i, islands)] = True
     return True
 
 
 @kernel
-def pair_restitution(own, a, b, otherwise):
-    """Return e of two shapes: the smaller of their values; `otherwise` if neither has one (both are above 1)."""
-    e = min(own[a], own[b])
-    return otherwise if e > 1.0 else e
+def pair_restitution(world, contacts, i):
+    """Return e of contact i: the smaller value of its two shapes; the scene's if neither has one (both are above 1)."""
+    e = min(world.own_restitution[contacts.shape_a[i]], world.own_restitution[contacts.shape_b[i]])
+    return world.restitution if e > 1.0 else e
 
 
 @kernel(needs="implicit")
@@ -285,11 +239,9 @@ def add_supports(world, state):
     contacts, begin, bounces = state.contacts, 0, False
     for i in range(state.contact_count[0] if world.implicit else 0):
         contacts.mark[i] = STRIKES if contacts.collides[i] else 0
-        bounces = bounces or contacts.collides[i] and pair_restitution(
-            world.own_restitution, contacts.shape_a[i], contacts.shape_b[i], world.restitution) > 0.0
+        bounces = bounces or contacts.collides[i] and pair_restitution(world, contacts, i) > 0.0
     for i in range(state.contact_count[0] if bounces else 0):
-        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
-                                 state.group_of_tree)
+        group = group_of_contact(world, contacts, i, state.group_of_tree)
         if group < 0 or state.state_of_tree[group] != COLLIDING or contacts.collides[i] or contacts.gap[i] > 0.0:
             continue
         before = contact_before(state, i, begin)

@@ -100,8 +100,8 @@ def _gather(world, state):
             continue
         f.contact[count] = i
         f.radius[count] = friction_of(world, contacts, i) * contacts.normal_force[i] * world.dt
-        first = moving_tree(contacts.body_a[i], world.tree_of_body, world.tree_start, world.tree_stop)
-        other = moving_tree(contacts.body_b[i], world.tree_of_body, world.tree_start, world.tree_stop)
+        first = moving_tree(world, contacts.body_a[i])
+        other = moving_tree(world, contacts.body_b[i])
         f.tree[count, 0], f.tree[count, 1] = first, -1 if other == first else other
         before = contact_before(state, i, begin)
         n, held, square = load(contacts.normal, i), (0.0, 0.0, 0.0), 0.0

@@ -93,8 +93,7 @@ def list_groups(world, state):
     for i in range(state.contact_count[0] - 1, -1, -1):
         contacts.normal_force[i] = 0.0
         store(contacts.friction_force, i, (0.0, 0.0, 0.0))
-        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
-                                 state.group_of_tree)
+        group = group_of_contact(world, contacts, i, state.group_of_tree)
         if group >= 0 and contacts.gap[i] <= 0.0 and contacts.mark[i] != LEFT:
             work.next[i], work.first[group], some = work.first[group], i, True
     if some:
@@ -145,8 +144,8 @@ def gather_contacts(world, state, group, s):
     work, contacts, count, begin, i = state.rest_work, state.contacts, 0, 0, state.rest_work.first[group]
     while i >= 0:
         work.contact[count] = i
-        a = moving_tree(contacts.body_a[i], world.tree_of_body, world.tree_start, world.tree_stop)
-        b = moving_tree(contacts.body_b[i], world.tree_of_body, world.tree_start, world.tree_stop)
+        a = moving_tree(world, contacts.body_a[i])
+        b = moving_tree(world, contacts.body_b[i])
         if a < 0:
             a, b = b, -1
         work.tree[count, 0], work.tree[count, 1] = a, -1 if b == a else b

@@ -10,15 +10,17 @@ from __future__ import annotations
 import math
 
 from iapb.compiled import kernel
-from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE
+from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE, SPHERE
 from iapb.contact.kernels.shape_frames import (
+    ball_on_surface,
+    balls,
+    place,
     placement,
     relative_frame,
-    store_in_plane,
-    to_world,
+    store_contact,
     turn_to_world,
     vertex_feature,
-    world_point,
+    world_center,
 )
 from iapb.contact.kernels.spatial_pairs import spatial_pair
 from iapb.elementary import hypotenuse
@@ -36,69 +38,49 @@ def detect(shapes, pairs, R, p, margin, buffer):
     for k in range(pairs.shape[0]):
         a, b = pairs[k, 0], pairs[k, 1]
         kind_a, kind_b = shapes.kind[a], shapes.kind[b]
-        if kind_a >= HALF_SPACE:
+        if kind_a == kind_b and kind_a in (CIRCLE, SPHERE):
+            count = balls(shapes, a, b, R, p, margin, buffer, count)
+        elif kind_a >= HALF_SPACE:
             count = spatial_pair(shapes, a, b, R, p, margin, buffer, count)
         elif kind_b == HALF_PLANE:
             count = vertices_half_plane(shapes, a, b, R, p, margin, buffer, count)
-        elif kind_a == CIRCLE and kind_b == CIRCLE:
-            count = circles(shapes, a, b, R, p, margin, buffer, count)
         elif kind_a == CIRCLE:
             count = circle_polygon(shapes, a, b, True, R, p, margin, buffer, count)
         elif kind_b == CIRCLE:
             count = circle_polygon(shapes, b, a, False, R, p, margin, buffer, count)
         else:
             count = polygons(shapes, a, b, R, p, margin, buffer, count)
-        if count < 0:
-            return -1
     return count
+
+
+@kernel
+def corner(shapes, shape, i):
+    """Return corner i of a polygon, in its frame."""
+    return shapes.vertices[shapes.first[shape] + i, 0], shapes.vertices[shapes.first[shape] + i, 1]
+
+
+@kernel
+def following(shapes, shape, i):
+    """Return the number of the corner, or edge, after number i."""
+    return i + 1 if i + 1 < shapes.count[shape] else 0
 
 
 @kernel
 def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
     """Write one contact per vertex of polygon a, or one for circle a: gap = (vertex - point)·normal - radius."""
-    vertices, plane, first = shapes.vertices, shapes.first[b], shapes.first[a]
-    x0, y0 = to_world(vertices[plane, 0], vertices[plane, 1], shapes.body[b], R, p)
-    nx, ny = turn_to_world(vertices[plane + 1, 0], vertices[plane + 1, 1], shapes.body[b], R)
-    radius = shapes.radius[a]
-    Rxx, Rxy, Ryx, Ryy, px, py = placement(shapes.body[a], R, p)
-    mx, my = Rxx * nx + Ryx * ny, Rxy * nx + Ryy * ny  # the normal in a's frame
-    offset = (px - x0) * nx + (py - y0) * ny - radius
+    (x0, y0), (nx, ny), radius = corner(shapes, b, 0), corner(shapes, b, 1), shapes.radius[a]
+    frame = placement(shapes.body[a], R, p)
+    mx, my = frame[0] * nx + frame[2] * ny, frame[1] * nx + frame[3] * ny  # the normal in a's frame
+    offset = (frame[4] - x0) * nx + (frame[5] - y0) * ny - radius
     for i in range(shapes.count[a]):
-        x, y = vertices[first + i, 0], vertices[first + i, 1]
+        x, y = corner(shapes, a, i)
         gap = mx * x + my * y + offset
         if gap <= margin:
             depth = radius + 0.5 * gap  # from the vertex (or centre) back to midway between the surfaces
-            x, y = Rxx * x + Rxy * y + px - depth * nx, Ryx * x + Ryy * y + py - depth * ny
-            count = store_in_plane(buffer, count, shapes, a, b, vertex_feature(0, i, 0), x, y, nx, ny, gap)
-            if count < 0:
-                return -1
+            x, y = place(frame, x, y)
+            count = store_contact(shapes, a, b, True, vertex_feature(0, i, 0), (x - depth * nx, y - depth * ny, 0.0),
+                                  (nx, ny, 0.0), gap, buffer, count)
     return count
-
-
-@kernel
-def circles(shapes, a, b, R, p, margin, buffer, count):
-    """Write the contact of two circles: gap = distance of centres - both radii, normal along the line of centres.
-
-    Coincident centres have no such line. The normal is then +y if a has the smaller shape index and -y for the
-    swapped pair, so that it is finite and still antisymmetric.
-    """
-    xa, ya = world_point(shapes, shapes.first[a], a, R, p)
-    xb, yb = world_point(shapes, shapes.first[b], b, R, p)
-    dx, dy = xa - xb, ya - yb
-    radius_a, radius_b = shapes.radius[a], shapes.radius[b]
-    reach = radius_a + radius_b + margin
-    if abs(dx) > reach or abs(dy) > reach:
-        return count
-    distance = hypotenuse(dx, dy)
-    gap = distance - (radius_a + radius_b)
-    if gap > margin:
-        return count
-    if distance > 0.0:
-        nx, ny = dx / distance, dy / distance
-    else:
-        nx, ny = 0.0, 1.0 if a < b else -1.0
-    middle = 0.5 * (distance + radius_b - radius_a)  # from b's centre along the normal
-    return store_in_plane(buffer, count, shapes, a, b, 0, xb + middle * nx, yb + middle * ny, nx, ny, gap)
 
 
 @kernel
@@ -107,62 +89,30 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
 
     For a centre inside the polygon, the contact is at the nearest edge.
     """
-    nx, ny, distance, feature = nearest_on_polygon(shapes, circle, polygon, margin, R, p)
-    radius = shapes.radius[circle]
-    gap = distance - radius
-    if gap > margin:
-        return count
-    nx, ny = turn_to_world(nx, ny, shapes.body[polygon], R)
-    x, y = world_point(shapes, shapes.first[circle], circle, R, p)
-    depth = radius + 0.5 * gap
-    x, y = x - depth * nx, y - depth * ny
-    if circle_is_a:
-        return store_in_plane(buffer, count, shapes, circle, polygon, feature, x, y, nx, ny, gap)
-    return store_in_plane(buffer, count, shapes, polygon, circle, feature, x, y, -nx, -ny, gap)
-
-
-@kernel
-def nearest_on_polygon(shapes, circle, polygon, margin, R, p):
-    """Return direction (polygon frame) and signed distance from the polygon to a circle's centre, and the feature.
-
-    It returns early, with a lower bound of the distance, if an edge shows that the gap exceeds the margin.
-    """
-    Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, polygon, circle, R, p)
-    row = shapes.first[circle]
-    cx, cy = shapes.vertices[row, 0], shapes.vertices[row, 1]
-    x, y = Qxx * cx + Qxy * cy + tx, Qyx * cx + Qyy * cy + ty
-    first, count = shapes.first[polygon], shapes.count[polygon]
+    x, y = corner(shapes, circle, 0)
+    x, y = place(relative_frame(shapes, polygon, circle, R, p), x, y)
     best, edge, nx, ny = -math.inf, 0, 0.0, 1.0
-    for i in range(count):
-        j = i + 1 if i + 1 < count else 0
-        ux, uy = shapes.vertices[first + i, 0], shapes.vertices[first + i, 1]
-        ex, ey = shapes.vertices[first + j, 0] - ux, shapes.vertices[first + j, 1] - uy
+    for i in range(shapes.count[polygon]):
+        (ux, uy), (wx, wy) = corner(shapes, polygon, i), corner(shapes, polygon, following(shapes, polygon, i))
+        ex, ey = wx - ux, wy - uy
         length = hypotenuse(ex, ey)
         distance = ((x - ux) * ey - (y - uy) * ex) / length
         if distance > best:
             best, edge, nx, ny = distance, i, ey / length, -ex / length
             if best - shapes.radius[circle] > margin:
-                return nx, ny, best, 0
-    following = edge + 1 if edge + 1 < count else 0
-    return _edge_or_corner(shapes, first, edge, following, x, y, best, nx, ny)
-
-
-@kernel
-def _edge_or_corner(shapes, first, edge, following, x, y, best, nx, ny):
-    """Return direction, distance and feature of the edge, or of its end if this is nearer to the point (x, y)."""
-    if best <= 0.0:
-        return nx, ny, best, vertex_feature(1, 0, edge)
-    ux, uy = shapes.vertices[first + edge, 0], shapes.vertices[first + edge, 1]
-    wx, wy = shapes.vertices[first + following, 0], shapes.vertices[first + following, 1]
+                return count
+    feature = vertex_feature(1, 0, edge)
+    (ux, uy), (wx, wy) = corner(shapes, polygon, edge), corner(shapes, polygon, following(shapes, polygon, edge))
     ex, ey = wx - ux, wy - uy
-    if (x - ux) * ex + (y - uy) * ey < 0.0:
-        corner, dx, dy = edge, x - ux, y - uy
-    elif (x - wx) * ex + (y - wy) * ey > 0.0:
-        corner, dx, dy = following, x - wx, y - wy
-    else:
-        return nx, ny, best, vertex_feature(1, 0, edge)
-    distance = hypotenuse(dx, dy)
-    return dx / distance, dy / distance, distance, vertex_feature(2, corner, 0)
+    before, beyond = (x - ux) * ex + (y - uy) * ey < 0.0, (x - wx) * ex + (y - wy) * ey > 0.0
+    if best > 0.0 and (before or beyond):  # an end of the edge is nearer
+        end = edge if before else following(shapes, polygon, edge)
+        ux, uy = corner(shapes, polygon, end)
+        best = hypotenuse(x - ux, y - uy)
+        nx, ny, feature = (x - ux) / best, (y - uy) / best, vertex_feature(2, end, 0)
+    nx, ny = turn_to_world(nx, ny, shapes.body[polygon], R)
+    return ball_on_surface(shapes, circle, polygon, circle_is_a, world_center(shapes, circle, R, p), (nx, ny, 0.0),
+                           best, feature, margin, buffer, count)
 
 
 # Contacts of two convex polygons: separating axes, clipping, and closest corners if they are separated.
@@ -198,17 +148,15 @@ def best_edge(shapes, onto, other, R, p, margin):
 
     separation of an edge = min over the vertices w of `other` of n·(w - v), n its outward normal, v its start
     """
-    Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, onto, other, R, p)
-    first, count = shapes.first[onto], shapes.count[onto]
-    first_other, count_other = shapes.first[other], shapes.count[other]
-    best, edge = -math.inf, 0
-    for i in range(count):
-        ux, uy, nx, ny, _ = edge_frame(shapes, first, count, i)
-        mx, my = Qxx * nx + Qyx * ny, Qxy * nx + Qyy * ny  # the normal in the other's frame
+    frame, best, edge = relative_frame(shapes, onto, other, R, p), -math.inf, 0
+    for i in range(shapes.count[onto]):
+        ux, uy, nx, ny, _ = edge_frame(shapes, onto, i)
+        mx, my = frame[0] * nx + frame[2] * ny, frame[1] * nx + frame[3] * ny  # the normal in the other's frame
         lowest = math.inf
-        for k in range(first_other, first_other + count_other):
-            lowest = min(lowest, mx * shapes.vertices[k, 0] + my * shapes.vertices[k, 1])
-        separation = lowest + nx * (tx - ux) + ny * (ty - uy)
+        for k in range(shapes.count[other]):
+            x, y = corner(shapes, other, k)
+            lowest = min(lowest, mx * x + my * y)
+        separation = lowest + nx * (frame[4] - ux) + ny * (frame[5] - uy)
         if separation > best:
             best, edge = separation, i
             if best > margin:
@@ -217,11 +165,10 @@ def best_edge(shapes, onto, other, R, p, margin):
 
 
 @kernel
-def edge_frame(shapes, first, count, edge):
+def edge_frame(shapes, shape, edge):
     """Return start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's frame."""
-    following = edge + 1 if edge + 1 < count else 0
-    ux, uy = shapes.vertices[first + edge, 0], shapes.vertices[first + edge, 1]
-    ex, ey = shapes.vertices[first + following, 0] - ux, shapes.vertices[first + following, 1] - uy
+    (ux, uy), (wx, wy) = corner(shapes, shape, edge), corner(shapes, shape, following(shapes, shape, edge))
+    ex, ey = wx - ux, wy - uy
     length = math.sqrt(ex * ex + ey * ey)
     return ux, uy, ey / length, -ex / length, length
 
@@ -229,10 +176,9 @@ def edge_frame(shapes, first, count, edge):
 @kernel
 def opposed_edge(shapes, other, mx, my):
     """Return the edge of `other` whose outward normal is most opposed to (mx, my), given in the frame of `other`."""
-    first, count = shapes.first[other], shapes.count[other]
     best, edge = math.inf, 0
-    for i in range(count):
-        _, _, nx, ny, _ = edge_frame(shapes, first, count, i)
+    for i in range(shapes.count[other]):
+        _, _, nx, ny, _ = edge_frame(shapes, other, i)
         if nx * mx + ny * my < best:
             best, edge = nx * mx + ny * my, i
     return edge
@@ -241,12 +187,13 @@ def opposed_edge(shapes, other, mx, my):
 @kernel
 def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, margin, buffer, count):
     """Write the contacts over the reference edge, or between two corners if the polygons are closest there."""
-    Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, ref, other, R, p)
-    ux, uy, nx, ny, length = edge_frame(shapes, shapes.first[ref], shapes.count[ref], edge)
-    incident = opposed_edge(shapes, other, Qxx * nx + Qyx * ny, Qxy * nx + Qyy * ny)
-    following = incident + 1 if incident + 1 < shapes.count[other] else 0
-    s0, h0 = over_edge(shapes, shapes.first[other] + incident, Qxx, Qxy, Qyx, Qyy, tx - ux, ty - uy, nx, ny)
-    s1, h1 = over_edge(shapes, shapes.first[other] + following, Qxx, Qxy, Qyx, Qyy, tx - ux, ty - uy, nx, ny)
+    xx, xy, yx, yy, tx, ty = relative_frame(shapes, ref, other, R, p)
+    ux, uy, nx, ny, length = edge_frame(shapes, ref, edge)
+    incident = opposed_edge(shapes, other, xx * nx + yx * ny, xy * nx + yy * ny)
+    from_start = (xx, xy, yx, yy, tx - ux, ty - uy)
+    s0, h0 = over_edge(shapes, other, incident, from_start, nx, ny)
+    next_incident = following(shapes, other, incident)
+    s1, h1 = over_edge(shapes, other, next_incident, from_start, nx, ny)
 
     size = length + abs(tx) + abs(ty) + abs(ux) + abs(uy)
     missed = s0 < 0.0 or s1 > length  # s0 >= s1: the incident edge runs against the reference edge
@@ -260,28 +207,22 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
         end_h = math.inf
 
     side, opposite = (0, 1) if ref_is_b else (1, 0)  # vertex of the incident or of the reference edge
-    for s, h, vertex, corner, cut in (
-        (start_s, start_h, incident, edge + 1, s0 > length),
-        (end_s, end_h, following, edge, s1 < 0.0),
+    for s, h, vertex, end, cut in (
+        (start_s, start_h, incident, following(shapes, ref, edge), s0 > length),
+        (end_s, end_h, next_incident, edge, s1 < 0.0),
     ):
-        if h > margin:
-            continue
-        feature = vertex_feature(side, vertex, edge)
-        if cut:
-            corner = corner if corner < shapes.count[ref] else 0
-            feature = vertex_feature(opposite, corner, incident)
-        x, y = ux - ny * s + 0.5 * h * nx, uy + nx * s + 0.5 * h * ny
-        count = _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, h, R, p, buffer, count)
-        if count < 0:
-            return -1
+        if h <= margin:
+            feature = vertex_feature(opposite, end, incident) if cut else vertex_feature(side, vertex, edge)
+            x, y = ux - ny * s + 0.5 * h * nx, uy + nx * s + 0.5 * h * ny
+            count = _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, h, R, p, buffer, count)
     return count
 
 
 @kernel
-def over_edge(shapes, row, Qxx, Qxy, Qyx, Qyy, tx, ty, nx, ny):
+def over_edge(shapes, other, vertex, from_start, nx, ny):
     """Return the coordinates of a vertex over the reference edge: s along it from its start, h along its normal."""
-    x, y = shapes.vertices[row, 0], shapes.vertices[row, 1]
-    x, y = Qxx * x + Qxy * y + tx, Qyx * x + Qyy * y + ty
+    x, y = corner(shapes, other, vertex)
+    x, y = place(from_start, x, y)
     return -ny * x + nx * y, nx * x + ny * y
 
 
@@ -295,44 +236,32 @@ def height_at(s, s0, h0, s1, h1):
 def _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, gap, R, p, buffer, count):
     """Store a contact given in the frame of shape `ref`, with its normal pointing out of it."""
     body = shapes.body[ref]
-    x, y = to_world(x, y, body, R, p)
     nx, ny = turn_to_world(nx, ny, body, R)
-    if ref_is_b:
-        return store_in_plane(buffer, count, shapes, other, ref, feature, x, y, nx, ny, gap)
-    return store_in_plane(buffer, count, shapes, ref, other, feature, x, y, -nx, -ny, gap)
+    if body >= 0:
+        x, y = place(placement(body, R, p), x, y)
+    return store_contact(shapes, other, ref, ref_is_b, feature, (x, y, 0.0), (nx, ny, 0.0), gap, buffer, count)
 
 
 @kernel
 def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
-    """Write one contact between the closest points of two separated polygons (both points are corners)."""
-    distance, vx, vy, wx, wy, feature = closest_points(shapes, ref, other, R, p)
-    if distance > margin:
-        return count
-    nx, ny = (wx - vx) / distance, (wy - vy) / distance
-    x, y = 0.5 * (vx + wx), 0.5 * (vy + wy)
-    return _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, distance, R, p, buffer, count)
-
-
-@kernel
-def closest_points(shapes, ref, other, R, p):
-    """Return the smallest distance of two polygons' corners, the corners v of `ref` and w of `other`, and the feature.
+    """Write one contact between the closest corners v of `ref` and w of `other`, two separated polygons.
 
     Pairs of corners are enough: if a corner is closest to the inside of an edge, the best axis is the normal of this
-    edge and its separation is already the distance. All values are in the frame of `ref`.
+    edge and its separation is already the distance.
     """
-    Qxx, Qxy, Qyx, Qyy, tx, ty = relative_frame(shapes, ref, other, R, p)
-    best, feature = math.inf, 0
+    frame, best, feature = relative_frame(shapes, ref, other, R, p), math.inf, 0
     vx, vy, wx, wy = 0.0, 0.0, 0.0, 0.0
     for j in range(shapes.count[other]):
-        row = shapes.first[other] + j
-        x, y = shapes.vertices[row, 0], shapes.vertices[row, 1]
-        x, y = Qxx * x + Qxy * y + tx, Qyx * x + Qyy * y + ty
+        x, y = corner(shapes, other, j)
+        x, y = place(frame, x, y)
         for i in range(shapes.count[ref]):
-            row = shapes.first[ref] + i
-            dx, dy = x - shapes.vertices[row, 0], y - shapes.vertices[row, 1]
-            square = dx * dx + dy * dy
+            ux, uy = corner(shapes, ref, i)
+            square = (x - ux) * (x - ux) + (y - uy) * (y - uy)
             if square < best:
-                best, wx, wy = square, x, y
-                vx, vy = shapes.vertices[row, 0], shapes.vertices[row, 1]
+                best, vx, vy, wx, wy = square, ux, uy, x, y
                 feature = vertex_feature(2, i, j) if ref < other else vertex_feature(2, j, i)
-    return math.sqrt(best), vx, vy, wx, wy, feature
+    distance = math.sqrt(best)
+    if distance > margin:
+        return count
+    return _store_from(shapes, ref, other, ref_is_b, feature, 0.5 * (vx + wx), 0.5 * (vy + wy), (wx - vx) / distance,
+                       (wy - vy) / distance, distance, R, p, buffer, count)

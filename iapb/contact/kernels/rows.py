@@ -43,22 +43,15 @@ def add_body_row(m, w, body, x, n, factor, out):
 
 
 @kernel
-def body_row(m, w, body, point, normal, out):
-    """out (d,) <- nᵀJ_b of one body alone, (13) and (14)."""
+def body_row(m, w, body, contacts, i, out):
+    """out (d,) <- nᵀJ_b of one body alone at contact i, (13) and (14)."""
     out[:] = 0.0
-    x, n = (point[0], point[1], point[2]), (normal[0], normal[1], normal[2])
-    add_body_row(m, w, body, x, n, 1.0, out)
-
-
-@kernel
-def contact_row(m, w, contacts, i, out):
-    """out (d,) <- nᵀ(J_a − J_b) of contact i, (11) and (12)."""
-    direction_row(m, w, contacts, i, load(contacts.normal, i), out)
+    add_body_row(m, w, body, load(contacts.point, i), load(contacts.normal, i), 1.0, out)
 
 
 @kernel
 def direction_row(m, w, contacts, i, direction, out):
-    """out (d,) <- row of the relative velocity at contact i along a unit direction."""
+    """out (d,) <- row of the relative velocity at contact i along a unit direction; the normal's is (11) and (12)."""
     out[:] = 0.0
     x = load(contacts.point, i)
     add_body_row(m, w, contacts.body_a[i], x, direction, 1.0, out)

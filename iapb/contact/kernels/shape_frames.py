@@ -1,19 +1,22 @@
-"""Helpers of the pair kernels: placements of shapes, feature numbers, storing a contact."""
+"""What the narrow phases of plane and space share: placements of shapes, feature numbers, balls, storing a contact."""
 
 from __future__ import annotations
 
-from iapb.compiled import kernel
-from iapb.linalg import add, column, load, store, transform
+import math
 
-# A feature number is (kind << 40) | (vertex << 20) | edge: vertex i of one shape against edge j of the other.
-# 20 bits hold a million vertices; shapes with more would need a different narrow phase anyway.
-_VERTEX_SHIFT, _KIND_SHIFT = 20, 40
+from iapb.compiled import kernel
+from iapb.contact.geometry import CIRCLE, HALF_SPACE
+from iapb.elementary import hypotenuse
+from iapb.linalg import add, column, dot, load, scale, store, subtract, transform
 
 
 @kernel
 def vertex_feature(kind, vertex, edge):
-    """Return the feature number. kind 0: vertex of a, edge of b; 1: vertex of b, edge of a; 2: two corners."""
-    return (kind << _KIND_SHIFT) | (vertex << _VERTEX_SHIFT) | edge
+    """Return the number of a feature: its kind, and vertex and edge with 20 bits each.
+
+    kind 0: vertex of a, edge of b; 1: vertex of b, edge of a; 2: two corners; 3 to 5: faces and edges of boxes
+    """
+    return (kind << 40) | (vertex << 20) | edge
 
 
 @kernel
@@ -25,62 +28,34 @@ def placement(body, R, p):
 
 
 @kernel
-def to_world(x, y, body, R, p):
-    """Return the world coordinates of a point given in a body's frame; body < 0 is the world."""
-    if body < 0:
-        return x, y
-    return (
-        R[body, 0, 0] * x + R[body, 0, 1] * y + p[body, 0],
-        R[body, 1, 0] * x + R[body, 1, 1] * y + p[body, 1],
-    )
+def relative_frame(shapes, onto, other, R, p):
+    """Return the planar placement (see `placement`) of the body of `other` in that of `onto`."""
+    ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], R, p)
+    jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], R, p)
+    dx, dy = jx - ix, jy - iy
+    return (ixx * jxx + iyx * jyx, ixx * jxy + iyx * jyy, ixy * jxx + iyy * jyx, ixy * jxy + iyy * jyy,
+            ixx * dx + iyx * dy, ixy * dx + iyy * dy)
+
+
+@kernel
+def place(frame, x, y):
+    """Return a point of the plane, given in a frame, where this frame is placed."""
+    return frame[0] * x + frame[1] * y + frame[4], frame[2] * x + frame[3] * y + frame[5]
 
 
 @kernel
 def turn_to_world(x, y, body, R):
-    """Return the world components of a direction given in a body's frame."""
+    """Return the world components of a direction of the plane given in a body's frame."""
     if body < 0:
         return x, y
     return R[body, 0, 0] * x + R[body, 0, 1] * y, R[body, 1, 0] * x + R[body, 1, 1] * y
 
 
 @kernel
-def world_point(shapes, row, shape, R, p):
-    """Return the world coordinates of row `row` of `shapes.vertices`, which belongs to `shape`."""
-    return to_world(shapes.vertices[row, 0], shapes.vertices[row, 1], shapes.body[shape], R, p)
-
-
-@kernel
-def relative_frame(shapes, onto, other, R, p):
-    """Return rotation Q (4 numbers) and translation t of `other` relative to `onto`: x_onto = Q x_other + t."""
-    ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], R, p)
-    jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], R, p)
-    dx, dy = jx - ix, jy - iy
-    return (
-        ixx * jxx + iyx * jyx,
-        ixx * jxy + iyx * jyy,
-        ixy * jxx + iyy * jyx,
-        ixy * jxy + iyy * jyy,
-        ixx * dx + iyx * dy,
-        ixy * dx + iyy * dy,
-    )
-
-
-@kernel
-def store_in_plane(buffer, count, shapes, a, b, feature, x, y, nx, ny, gap):
-    """Do `store_in_space` for a contact in the plane."""
-    return store_in_space(buffer, count, shapes, a, b, feature, (x, y, 0.0), (nx, ny, 0.0), gap)
-
-
-# The same helpers in space, where vectors are tuples (see `iapb.linalg`).
-
-
-@kernel
 def world_center(shapes, shape, R, p):
-    """Return, in the world, the centre of a sphere or box, or the point of a half-space."""
+    """Return, in the world, the centre of a circle, sphere or box, or the point of a half-space."""
     body, local = shapes.body[shape], load(shapes.center, shape)
-    if body < 0:
-        return local
-    return add(load(p, body), transform(R, body, local))
+    return local if body < 0 else add(load(p, body), transform(R, body, local))
 
 
 @kernel
@@ -91,18 +66,56 @@ def world_axis(shapes, shape, k, R):
 
 
 @kernel
-def store_in_space(buffer, count, shapes, a, b, feature, point, normal, gap):
-    """Write one contact at row `count`; return the next row, or -1 when the buffer is full."""
-    if count >= buffer.gap.shape[0]:
+def world_axes(shapes, shape, R):
+    """Return the three axes of a shape in the world."""
+    return world_axis(shapes, shape, 0, R), world_axis(shapes, shape, 1, R), world_axis(shapes, shape, 2, R)
+
+
+@kernel
+def balls(shapes, a, b, R, p, margin, buffer, count):
+    """Write the contact of two circles or two spheres: gap = distance of centres - both radii.
+
+    Coincident centres have no line for the normal. It is then along the last axis, antisymmetric in the two shapes.
+    """
+    center = world_center(shapes, b, R, p)
+    apart = subtract(world_center(shapes, a, R, p), center)
+    radius_a, radius_b, flat = shapes.radius[a], shapes.radius[b], shapes.kind[a] == CIRCLE
+    if max(abs(apart[0]), abs(apart[1])) > radius_a + radius_b + margin:
+        return count
+    distance = hypotenuse(apart[0], apart[1]) if flat else math.sqrt(dot(apart, apart))
+    gap = distance - (radius_a + radius_b)
+    if gap > margin:
+        return count
+    sign = 1.0 if a < b else -1.0
+    normal = (0.0, sign, 0.0) if flat else (0.0, 0.0, sign)
+    if distance > 0.0:
+        normal = (apart[0] / distance, apart[1] / distance, apart[2] / distance)
+    point = add(center, scale(0.5 * (distance + radius_b - radius_a), normal))
+    return store_contact(shapes, a, b, True, 0, point, normal, gap, buffer, count)
+
+
+@kernel
+def ball_on_surface(shapes, ball, other, ball_is_a, center, normal, distance, feature, margin, buffer, count):
+    """Write the contact of a circle or sphere with the surface at a signed distance from its centre."""
+    gap = distance - shapes.radius[ball]
+    if gap > margin:
+        return count
+    point = subtract(center, scale(shapes.radius[ball] + 0.5 * gap, normal))
+    return store_contact(shapes, ball, other, ball_is_a, feature, point, normal, gap, buffer, count)
+
+
+@kernel
+def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buffer, count):
+    """Write a contact at row `count`, its normal given out of shape `other`; return the next row, or -1: no room."""
+    if not 0 <= count < buffer.gap.shape[0]:
         return -1
-    buffer.shape_a[count] = a
-    buffer.shape_b[count] = b
-    buffer.body_a[count] = shapes.body[a]
-    buffer.body_b[count] = shapes.body[b]
-    buffer.feature[count] = feature
+    a, b = (one, other) if one_is_a else (other, one)
+    if not one_is_a:
+        normal = (-normal[0], -normal[1], -normal[2] if shapes.kind[a] >= HALF_SPACE else 0.0)
+    buffer.shape_a[count], buffer.shape_b[count], buffer.feature[count] = a, b, feature
+    buffer.body_a[count], buffer.body_b[count], buffer.gap[count] = shapes.body[a], shapes.body[b], gap
     store(buffer.point, count, point)
     store(buffer.normal, count, normal)
-    buffer.gap[count] = gap
     return count + 1
 
 

@@ -127,8 +127,7 @@ def find_contacts(world, state):
     state.contact_impulse[:count] = 0.0
     contact_velocities(world.mechanism, state.body, state.v, state.contacts, count)
     mark_new(state.contacts, count, state.previous, state.contact_count[1], world.coherence_distance)
-    classify(state.contacts, count, world.tree_of_body, world.tree_start, world.tree_stop, world.approach_velocity,
-             state.spreading, state.group_of_tree, state.state_of_tree)
+    classify(world, state, count)
     if not world.switches.impulses:
         for t in range(state.state_of_tree.shape[0]):
             if state.state_of_tree[t] == COLLIDING:
@@ -397,8 +396,7 @@ def rest(world, state, stage):
         contacts.normal_force[i] = 0.0
         for axis in range(3):
             contacts.friction_force[i, axis] = 0.0
-        group = group_of_contact(contacts, i, world.tree_of_body, world.tree_start, world.tree_stop,
-                                 state.group_of_tree)
+        group = group_of_contact(world, contacts, i, state.group_of_tree)
         if group >= 0 and state.state_of_tree[group] != COLLIDING:
             friction = 0.0 if world.coulomb else friction_of(world, contacts, i)
             resting_force(world.mechanism, state.body, contacts, i, world.stiffness, world.damping, world.clamped,

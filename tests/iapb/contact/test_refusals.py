@@ -1,4 +1,4 @@
-"""What each border refuses, by the name of the wrong argument: impacts, many impacts, friction, laws, shapes."""
+"""What each border refuses, by the name of the wrong argument: impacts, many impacts, friction, laws."""
 
 from __future__ import annotations
 
@@ -9,17 +9,6 @@ import numpy as np
 import pytest
 
 from iapb import IapbError, RangeError, resolve_frictional_impact, resolve_impact, resolve_impacts
-from iapb.contact.geometry import (
-    Circle,
-    HalfPlane,
-    HalfSpace,
-    Polygon,
-    SpatialBox,
-    Sphere,
-    box,
-    make_shapes,
-    make_spatial_shapes,
-)
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
 from iapb.scene import find_scene, load_scene
@@ -161,26 +150,3 @@ def test_a_step_other_than_the_scenes_is_refused() -> None:
     with pytest.raises(ArgumentError) as caught:
         Penalty().advance(system, system.make_state(), np.zeros(3), 0.1)
     assert caught.value.argument == "dt"
-
-
-@pytest.mark.parametrize(("shape", "field"), [
-    (Circle(0.0), "radius"), (Circle(INF), "radius"), (Circle(1.0, (NAN, 0.0)), "center"),
-    (HalfPlane((0, 0), (0, 0)), "normal"), (HalfPlane((0, 0, 0), (0, 1)), "point"),
-    (Polygon([[0, 0], [1, 0]]), "vertices"), (Polygon([[0, 0], [2, 0], [1, 0.5], [1, 2]]), "vertices"),
-    (Polygon([[0, 0], [1, 1], [1, 0], [0, 1]]), "vertices"),
-    (Sphere(-1.0), "radius"), (Sphere(1.0, (0, 0)), "center"), (HalfSpace((0, 0, 0), (0, 0, 0)), "normal"),
-    (SpatialBox((1, 1, 0)), "size"), (SpatialBox((1, 1, 1), rotation=np.diag([1, 1, -1])), "rotation"),
-    (SpatialBox((1, 1, 1), rotation=np.eye(3) + 1e-7), "rotation"),
-])
-def test_shapes_that_are_none(shape: Any, field: str) -> None:
-    make: Any = make_spatial_shapes if isinstance(shape, Sphere | HalfSpace | SpatialBox) else make_shapes
-    with pytest.raises(ArgumentError) as caught:
-        make([Circle(1.0) if make is make_shapes else Sphere(1.0), shape])
-    assert caught.value.argument == f"shapes[1].{field}"
-
-
-def test_a_box_without_a_side_and_a_clockwise_polygon() -> None:
-    with pytest.raises(ArgumentError, match="size"):
-        box((1.0, 0.0))
-    corners = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
-    assert np.array_equal(make_shapes([Polygon(corners)]).vertices, corners[::-1])
