@@ -7,22 +7,29 @@ This module is independent of pages and files.
 
 from __future__ import annotations
 
-import math
 import re
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import Any, TypeVar
-
-import numpy as np
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
+from verification.region import LEAST_CONFIRMING as LEAST_CONFIRMING
+from verification.region import Region as Region
+from verification.region import confirmed
+from verification.region import search_region as search_region
+from verification.table import HOLDS as HOLDS
+from verification.table import WORDS as WORDS
+from verification.table import Column as Column
+from verification.table import Row as Row
+from verification.table import Table as Table
+from verification.table import ranges as ranges
+from verification.table import table_of as table_of
+from verification.table import titled as titled
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
-Row = Mapping[str, Any]
 
 # WHERE: the claim holds in every trial inside `Part.region`. MIXED: it holds in some trials; no region is confirmed.
 REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
@@ -30,199 +37,16 @@ REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
 )  # fmt: skip
 # A claim that fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
-# Least number of trials that confirm a region or reproduce a part. If the claim were wrong in a quarter of the region,
-# ten trials in a row would hold with probability 0.05 (0.74¹⁰); if it were wrong in half, with probability 1/1024. A
-# single failure counts.
-LEAST_CONFIRMING = LEAST_DECIDED = 10
-SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
-_MOST_ENDS = 8  # above the number of ends of two intervals
-_DECADES = 1e3  # a condition with a larger ratio of its ends is measured in decades
-_LISTED = 8  # if there are more values, only the smallest and largest are printed
+LEAST_DECIDED = 10  # least number of trials that reproduce a part; for the reason see LEAST_CONFIRMING
 # A finding is reproduced only if every part is decided.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
-HOLDS = "holds"  # heading of the outcomes in printed tables
-WORDS = {True: "yes", False: "no", None: "cannot tell"}  # words for the outcomes
 FAILED_CASES = "not computed"  # name of the table of cases that failed
 # Quantities that several pages quote: in a report each has one value and one verdict. To add one, add its name here;
 # the Part or Finding whose sentence quotes it lists the name with the value as printed.
 QUANTITIES = ("impacts certified", "adverse impacts certified", "time of a peg step", "exponent of bodies",
               "hard cases of the engine", "speed targets")  # fmt: skip
 Quantities = tuple[tuple[str, str], ...]  # names and values
-_UNIT = re.compile(r"^(?P<key>.*\S) \[(?P<unit>[^\[\]]+)\]$")
-
-
-@dataclass(frozen=True)
-class Column:
-    """One quantity of every row.
-
-    key : name of the column in code; heading : printed name, by default the key; unit : empty if there is none
-    condition : True if the study chooses the value, False if it measures it
-    part : True if the rows with the same value form one part, which is judged separately
-    cases : True if the value counts the cases of a row, such as the impacts of a batch whose worst one is judged
-    timed : True for a measured time or a value computed from one; it may differ in the next run
-    prose : True for sentences; the numbers in them are compared through other tables
-    """
-
-    key: str
-    unit: str = ""
-    heading: str = ""
-    condition: bool = False
-    part: bool = False
-    cases: bool = False
-    timed: bool = False
-    prose: bool = False
-
-    @property
-    def title(self) -> str:
-        """The heading with the unit."""
-        words = self.heading or self.key
-        return f"{words} [{self.unit}]" if self.unit else words
-
-
-@dataclass(frozen=True)
-class Table:
-    """Rows of numbers, texts or None ("does not apply"), and the description of each column.
-
-    holds : whether the claim holds, one entry per row; None if the row cannot decide; empty if nothing is judged
-    digits : significant digits in print; note : text printed below the table
-    timed_rows : True if the selection of rows depends on measured times
-    """
-
-    columns: tuple[Column, ...]
-    rows: tuple[tuple[Any, ...], ...] = ()
-    holds: tuple[bool | None, ...] = ()
-    digits: int = 4
-    note: str = ""
-    timed_rows: bool = False
-
-    def column(self, key: str) -> list[Any]:
-        """Return the values of one column."""
-        index = self.keys.index(key)
-        return [row[index] for row in self.rows]
-
-    def records(self) -> list[dict[str, Any]]:
-        """Return the rows as dictionaries by key."""
-        return [dict(zip(self.keys, row, strict=True)) for row in self.rows]
-
-    def where(self, **values: Any) -> Table:
-        """Return the rows in which the named columns have these values."""
-        return self.only([all(row[key] == value for key, value in values.items()) for row in self.records()])
-
-    def that(self, outcome: bool | None) -> Table:
-        """Return the rows with this outcome."""
-        return self.only([held is outcome for held in self.holds])
-
-    def select(self, keys: Sequence[str]) -> Table:
-        """Return the table with these columns, in this order."""
-        at = [self.keys.index(key) for key in keys]
-        kept = tuple(tuple(row[k] for k in at) for row in self.rows)
-        return replace(self, columns=tuple(self.columns[k] for k in at), rows=kept)
-
-    def judged(self, holds: Callable[[dict[str, Any]], bool | None]) -> Table:
-        """Return the table with the outcome `holds(row)` of every row."""
-        return replace(self, holds=tuple(holds(row) for row in self.records()))
-
-    def without(self, *keys: str) -> Table:
-        """Return the table without these columns."""
-        return self.select([key for key in self.keys if key not in keys])
-
-    @property
-    def passed(self) -> bool | None:
-        """Whether the claim holds in every row with an outcome; None if no row has one."""
-        decided = [outcome for outcome in self.holds if outcome is not None]
-        return all(decided) if decided else None
-
-    @property
-    def keys(self) -> list[str]:
-        """Keys of the columns."""
-        return [column.key for column in self.columns]
-
-    @property
-    def titles(self) -> tuple[str, ...]:
-        """Printed headings; the heading of the outcomes comes last."""
-        return (*(column.title for column in self.columns), *([HOLDS] if self.holds else ()))
-
-    @property
-    def cells(self) -> tuple[tuple[Any, ...], ...]:
-        """Printed rows; if the table has outcomes, each row ends with its outcome in words."""
-        if not self.holds:
-            return self.rows
-        return tuple((*row, WORDS[held]) for row, held in zip(self.rows, self.holds, strict=True))
-
-    @property
-    def timed(self) -> tuple[str, ...]:
-        """Titles of the timed columns; the outcomes are included, since they may depend on any measured value."""
-        found = tuple(column.title for column in self.columns if column.timed)
-        return (*found, HOLDS) if found and self.holds else found
-
-    @property
-    def prose(self) -> tuple[str, ...]:
-        """Titles of the columns of sentences."""
-        return tuple(column.title for column in self.columns if column.prose)
-
-    def only(self, kept: Iterable[bool]) -> Table:
-        """Return the rows whose entry in `kept` is true, with their outcomes."""
-        kept = list(kept)
-        rows = tuple(row for row, keep in zip(self.rows, kept, strict=True) if keep)
-        return replace(self, rows=rows, holds=tuple(h for h, keep in zip(self.holds, kept, strict=False) if keep))
-
-
-def table_of(columns: Sequence[Column], records: Iterable[Row], **options: Any) -> Table:
-    """Return a table of these columns from dictionaries; missing keys become None."""
-    rows = tuple(tuple(record.get(column.key) for column in columns) for record in records)
-    return Table(tuple(columns), rows, **options)
-
-
-def titled(
-    titles: Sequence[str], rows: Iterable[Sequence[Any]] = (), digits: int = 4, note: str = "",
-    timed: Sequence[str] = (), timed_rows: bool = False, prose: Sequence[str] = (),
-) -> Table:
-    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is key and heading.
-
-    `timed` and `prose` list the titles of the timed columns and of the columns of sentences.
-    """
-    for kind, names in (("timed", timed), ("prose", prose)):
-        if unknown := [name for name in names if name not in titles]:
-            raise ValueError(f"{kind} columns {unknown}: expected some of {tuple(titles)}")
-    found = [(_UNIT.match(title), title) for title in titles]
-    columns = tuple(
-        Column(match["key"] if match else title, match["unit"] if match else "",
-               timed=title in timed, prose=title in prose)
-        for match, title in found
-    )  # fmt: skip
-    return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, timed_rows)
-
-
-@dataclass(frozen=True)
-class Region:
-    """Region in which a part holds: bounds on one or two conditions. The claim holds in every trial inside.
-
-    bounds : condition, its unit, lowest and highest value; None if the region extends to the end of the tested range
-    searched : number of trials inside, from the half in which the region was found; others : from the other half
-    fresh : number of trials drawn for the confirmation
-    share : share of the tested range that the region covers, by length or by decades
-    """
-
-    bounds: tuple[tuple[str, str, float | None, float | None], ...]
-    searched: int = 0
-    others: int = 0
-    fresh: int = 0
-    share: float = 0.0
-
-    def contains(self, row: Row) -> bool:
-        """Whether a trial lies inside the region or on its bounds."""
-        return all((low is None or row[key] >= low) and (high is None or row[key] <= high)
-                   for key, _, low, high in self.bounds)  # fmt: skip
-
-    def ends(self, key: str, tested: Sequence[float]) -> tuple[float, float]:
-        """Return the bounds of a condition; the end of the tested range replaces a missing bound."""
-        low, high = next(((low, high) for name, _, low, high in self.bounds if name == key), (None, None))
-        return min(tested) if low is None else low, max(tested) if high is None else high
-
-    def __str__(self) -> str:
-        """The bounds, such as "tilt <= 0.015 rad"."""
-        return " and ".join(_bound(*bound) for bound in self.bounds)
 
 
 @dataclass(frozen=True)
@@ -376,28 +200,33 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
     with failures is mixed or refuted, however few trials there are.
     """
     verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
-    held, decided = trials.holds.count(True), sum(outcome is not None for outcome in trials.holds)
-    part = Part("", verdict, name, held, decided, len(trials.rows) - decided, None, _where_it_fails(trials), timed)
-    said = _count(part)
+    held, decided, total = trials.holds.count(True), len(trials.decided), len(trials.rows)
+    said = f"holds in {held} of {decided} trials" if decided else "no trial can tell"
+    if 0 < decided < total:
+        said = f"{said}; {total - decided} of {total} cannot tell"
+    part = Part("", verdict, name, held, decided, total - decided, None, _where_it_fails(trials), timed)
     if verdict == MIXED:
-        region, tried = _confirmed(trials, fresh)
-        part = replace(part, region=region, verdict=WHERE if region else MIXED)
-        said = f"{said}; {tried}"
-    cases = _decided_cases(trials)
+        region, tried = confirmed(trials, fresh)
+        part, said = replace(part, region=region, verdict=WHERE if region else MIXED), f"{said}; {tried}"
+    judged = trials.only(held is not None for held in trials.holds)
+    counts = [sum(count or 0 for count in judged.column(column.key)) for column in trials.columns if column.cases]
+    cases = max(decided, *counts, 0)
     if decided < LEAST_DECIDED <= cases:
-        part = replace(part, cases=cases)
-        said = f"{said}, which stand for {cases} cases"
+        part, said = replace(part, cases=cases), f"{said}, which stand for {cases} cases"
     elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE:
         part = replace(part, verdict=NOT_TESTABLE if part.verdict == REPRODUCED else part.verdict)
         said = f"{said}; fewer than {LEAST_DECIDED} decide"
     return replace(part, sentence=f"{said}.")
 
 
-def _decided_cases(trials: Table) -> int:
-    """Number of cases in the trials that have an outcome."""
-    decided = trials.only(held is not None for held in trials.holds)
-    counts = [column.key for column in trials.columns if column.cases]
-    return max(len(decided.rows), *(sum(count or 0 for count in decided.column(key)) for key in counts), 0)
+def _where_it_fails(trials: Table) -> str:
+    """The number of failed trials and their conditions, in words; "" if none failed."""
+    failed, decided = trials.that(False), len(trials.decided)
+    if not failed.rows:
+        return ""
+    if len(failed.rows) == decided:
+        return f"in all {decided} trials"
+    return f"in {len(failed.rows)} of {decided} trials, with {ranges(failed).replace('; ', ', ')}"
 
 
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
@@ -436,153 +265,6 @@ def finding_of(
     made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed,
                    quantities=quantities)
     return with_failures(made, failures)
-
-
-def ranges(table: Table) -> str:
-    """Return the conditions of a table in words: each with its values, or with its range if there are many."""
-    return "; ".join(f"{column.key} {_span(table.column(column.key))} {column.unit}".rstrip()
-                     for column in table.columns if column.condition and table.rows)  # fmt: skip
-
-
-def search_region(trials: Table) -> Region | None:
-    """Return the region, bounded in one or two conditions, with most trials and no failure; None if there is none.
-
-    The search tries every interval between values of a condition, alone and with every interval of every other
-    condition. Among regions with equally many trials it takes the one with the fewest bounds, then the first in the
-    order of the columns. It adds a second condition only if the region then keeps at least 1.5 times as many trials,
-    because the simpler region generalizes better.
-    """
-    scales = [_intervals(column, trials) for column in trials.columns if column.condition]
-    scales = [scale for scale in scales if len(scale) > 1]
-    alone = max((_best(trials, scale, [_Interval()]) for scale in scales), key=_kept_simply, default=(0, ()))
-    pairs = (_best(trials, first, second) for first, second in combinations(scales, 2))
-    together = max(pairs, key=_kept_simply, default=(0, ()))
-    kept, chosen = together if 2 * together[0] >= 3 * alone[0] else alone
-    if not kept or not chosen:
-        return None
-    share = math.prod(interval.share for interval in chosen)
-    return Region(tuple((x.key, x.unit, x.low, x.high) for x in chosen), kept, share=share)
-
-
-def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, tuple[_Interval, ...]]:
-    """Number of trials that the best pair of intervals keeps without a failure, and those of the two with a bound."""
-    held, failed = (np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False))
-    inside, other = (np.array([interval.inside(trials) for interval in scale]) for scale in (first, second))
-    kept, wrong = ((inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed))
-    ends = np.add.outer([interval.ends for interval in first], [interval.ends for interval in second])
-    score = np.where(wrong == 0, _MOST_ENDS * kept - ends, -_MOST_ENDS)
-    i, j = np.unravel_index(int(score.argmax()), score.shape)
-    found = int(kept[i, j]) if wrong[i, j] == 0 else 0
-    return found, tuple(interval for interval in (first[i], second[j]) if interval.ends)
-
-
-def _kept_simply(found: tuple[int, tuple[_Interval, ...]]) -> tuple[int, int]:
-    return found[0], -sum(interval.ends for interval in found[1])
-
-
-@dataclass(frozen=True)
-class _Interval:
-    """Values of one condition between `low` and `high`; None means no bound on that side."""
-
-    key: str = ""
-    unit: str = ""
-    low: float | None = None
-    high: float | None = None
-    share: float = 1.0
-
-    @property
-    def ends(self) -> int:
-        return (self.low is not None) + (self.high is not None)
-
-    def inside(self, trials: Table) -> np.ndarray:
-        if not self.key:
-            return np.ones(len(trials.rows), np.bool_)
-        values = np.array(trials.column(self.key), float)
-        return (values >= (-np.inf if self.low is None else self.low)) & (
-            values <= (np.inf if self.high is None else self.high)
-        )
-
-
-def _intervals(column: Column, trials: Table) -> list[_Interval]:
-    """All intervals between two values of a condition, including the unbounded one; empty if a value is no number."""
-    values = trials.column(column.key)
-    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return []
-    seen = sorted(set(values))
-    if len(seen) < 2:
-        return []
-    scale = math.log10 if seen[0] > 0 and seen[-1] / seen[0] >= _DECADES else float
-    length = scale(seen[-1]) - scale(seen[0])
-    return [
-        _Interval(column.key, column.unit, low if i else None, high if j < len(seen) - 1 else None,
-                  (scale(high) - scale(low)) / length)
-        for i, low in enumerate(seen) for j, high in enumerate(seen) if i < j
-    ]  # fmt: skip
-
-
-def _confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:
-    """The region that the other half and fresh trials confirm, and the result of the search in words.
-
-    If the other half contradicts the region, both halves are searched; then only fresh trials can confirm a region.
-    """
-    first = np.zeros(len(trials.rows), np.bool_)
-    first[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
-    region = search_region(trials.only(first))
-    inside = trials.only(not searched and region is not None and region.contains(row)
-                         for searched, row in zip(first, trials.records(), strict=True))  # fmt: skip
-    if region is None or False in inside.holds:
-        contradicted = f"{region} fails in {_failing(inside)} other trials" if region else ""
-        region, inside = (search_region(trials), trials.only(False for _ in trials.rows)) if fresh else (None, inside)
-        if region is None:
-            return None, f"no region confirmed: {contradicted}" if contradicted else "no region found"
-    drawn = fresh(region) if fresh else inside.only(False for _ in inside.rows)
-    if False in drawn.holds:
-        return None, f"no region confirmed: {region} fails in {_failing(drawn)} fresh trials"
-    region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
-    counts = (f"{region.searched} trials that found this region, {region.others} others and {region.fresh} fresh ones "
-              "hold")  # fmt: skip
-    if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
-        return None, f"no region confirmed: for {region} only {counts}"
-    return region, f"where {region} ({region.share:.0%} of the tested range) all {counts}"
-
-
-def _failing(trials: Table) -> str:
-    return f"{trials.holds.count(False)} of {sum(held is not None for held in trials.holds)}"
-
-
-def _count(part: Part) -> str:
-    """The number of trials in which a part holds and the number without an outcome, in words."""
-    told = f"holds in {part.held} of {part.decided} trials" if part.decided else "no trial can tell"
-    total = part.decided + part.unknown
-    return f"{told}; {part.unknown} of {total} cannot tell" if part.unknown and part.decided else told
-
-
-def _where_it_fails(trials: Table) -> str:
-    """The number of failed trials and their conditions, in words; "" if none failed."""
-    failed = trials.that(False)
-    if not failed.rows:
-        return ""
-    decided = sum(outcome is not None for outcome in trials.holds)
-    if len(failed.rows) == decided:
-        return f"in all {decided} trials"
-    return f"in {len(failed.rows)} of {decided} trials, with {ranges(failed).replace('; ', ', ')}"
-
-
-def _span(values: Sequence[Any]) -> str:
-    found = {value for value in values if value is not None}
-    if any(isinstance(value, str) for value in found):
-        return ", ".join(sorted(map(str, found)))
-    ordered = sorted(found)
-    if len(ordered) > _LISTED:
-        return f"{ordered[0]:g} to {ordered[-1]:g}"
-    return ", ".join(f"{value:g}" for value in ordered)
-
-
-def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
-    key = key.replace("_", " ")
-    if low is None:
-        return f"{key} <= {high:g} {unit}".rstrip()
-    return f"{key} >= {low:g} {unit}".rstrip() if high is None else f"{low:g} <= {key} <= {high:g} {unit}".rstrip()
 
 
 def failure_of(case: str, error: Exception) -> Failure:

@@ -2,93 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from iapb import Certificate, certify
+from iapb import certify
 from iapb.contact.laws import ENGINE_LAWS
-from reports.runner import Runner
 from reports.store.runs import read_run
-from verification.finding import (
-    HOLDS,
-    NOT_TESTABLE,
-    Column,
-    Failure,
-    Finding,
-    Part,
-    attempt,
-    finding_of,
-    table_of,
-    verdict_of_law,
-)
+from verification.check import Check, Study, Topic
+from verification.finding import NOT_TESTABLE, Part, verdict_of_law
 from verification.laws.exact_energy import FAMILIES, exact_energy
+from verification.table import HOLDS, Row, Table
 
 _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
-_RUNS = (Column("run"), Column("law"), Column("impacts"), Column("gains"), Column("largest gain"),
-         Column("M Δv − impulse"), Column("Jᵀp − impulse"), Column("restitution"), Column(HOLDS))  # fmt: skip
-_FAMILIES = (Column("family"), Column("impacts"), Column("gains"), Column("moved"), Column("cancelled"),
-             Column("median energy cost"), Column("largest energy cost"), Column(HOLDS))  # fmt: skip
 _NOTE = ("Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: impacts without any passive step, so v⁺ = v⁻. Energy "
          "cost: the loss at e = 1 beyond that of the same impact without clamp, in units of 10 d ε √κ(M).")
 
 
-def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Certify every engine run that the report uses, and adverse impacts of the compiled resolver.
+def _certified(study: Study, name: str) -> Iterable[Row]:
+    """Yield the row of a run; none if the run's law is not the engine's or the run has no impact.
 
     Rigid worlds are left out: they solve for the impulses and forces of a step together and record no separate impact.
     """
-    failures: list[Failure] = []
-    files, rows = runner.used_so_far(), []
-    for done, name in enumerate(files):
-        progress(done, len(files) + len(FAMILIES))
-        row = attempt(name, lambda name=name: _certified(runner, name), failures)  # type: ignore[misc]
-        if row:
-            rows.append(row)
-    drawn: list[dict[str, Any]] = []
-    for done, family in enumerate(FAMILIES):
-        progress(len(files) + done, len(files) + len(FAMILIES))
-        one = exact_energy(family, _DRAWN[depth])
-        drawn.append({"family": family, "impacts": one.impacts, "gains": one.gains, "moved": one.moved,
-                      "cancelled": one.cancelled, "median energy cost": _known(one.price[0]),
-                      "largest energy cost": _known(one.price[2]), HOLDS: one.holds})
-    certified = ("impacts certified", f"{_sum(rows, 'impacts'):,}")
-    provoked = ("adverse impacts certified", f"{_sum(drawn, 'impacts'):,}")
-    recorded = (f"{_sum(rows, 'gains')} of {certified[1]} impacts in {len(rows):,} runs of the engine "
-                "gained energy in exact arithmetic")  # fmt: skip
-    least = min((one["moved"] for one in drawn), default=0.0)
-    adverse = (f"nor did {provoked[1]} random impacts drawn to provoke a gain" if not _sum(drawn, "gains") else
-               f"{_sum(drawn, 'gains')} of {provoked[1]} random impacts drawn to provoke a gain did")  # fmt: skip
-    moved = f"in every family the impact changed the velocity in at least {least:.1%} of the cases"
-    parts = (Part(recorded, verdict_of_law(row[HOLDS] for row in rows), quantities=(certified,)),
-             Part(f"{adverse}; {moved}", verdict_of_families([one[HOLDS] for one in drawn]),
-                  quantities=(provoked,)))  # fmt: skip
-    tables = {"certified runs": table_of(_RUNS, rows), "adverse impacts": table_of(_FAMILIES, drawn, note=_NOTE)}
-    question = "Does any impact gain energy, even in the last bit?"
-    return finding_of("exact-energy", "Exact energy", question, f"{recorded}; {adverse}.", parts, tables, failures,
-                      (certified, provoked))
+    run = read_run(study.run.store.folder / name)  # type: ignore[attr-defined]
+    if run.law in ENGINE_LAWS and len(run.impacts.step):
+        one = certify(run)
+        yield {"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains,
+               "largest gain": one.largest_gain, "M Δv − impulse": _known(one.momentum),
+               "Jᵀp − impulse": _known(one.span), "restitution": _known(one.restitution), HOLDS: one.passed}
 
 
-def verdict_of_families(holds: list[bool | None]) -> str:
-    """Return the verdict on all families; without a failing family, one that moved too rarely makes it NOT_TESTABLE."""
-    return NOT_TESTABLE if None in holds and False not in holds else verdict_of_law(holds)
-
-
-def _certified(runner: Runner, name: str) -> dict[str, Any]:
-    """Return the table row of a run; it is empty if the run's law is not the engine's or the run has no impact."""
-    run = read_run(runner.store.folder / name)
-    if run.law not in ENGINE_LAWS or not len(run.impacts.step):
-        return {}
-    one: Certificate = certify(run)
-    return {"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains, "largest gain": one.largest_gain,
-            "M Δv − impulse": _known(one.momentum), "Jᵀp − impulse": _known(one.span),
-            "restitution": _known(one.restitution), HOLDS: one.passed}  # fmt: skip
+def _drawn(study: Study, family: str) -> Row:
+    one = exact_energy(family, _DRAWN[study.depth])
+    return {"family": family, "impacts": one.impacts, "gains": one.gains, "moved": one.moved,
+            "cancelled": one.cancelled, "median energy cost": _known(one.price[0]),
+            "largest energy cost": _known(one.price[2]), HOLDS: one.holds}  # fmt: skip
 
 
 def _known(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def _sum(rows: list[dict[str, Any]], column: str) -> int:
-    return sum(row[column] for row in rows)
+def verdict_of_families(holds: Iterable[bool | None]) -> str:
+    """Return the verdict on all families; without a failing family, one that moved too rarely makes it NOT_TESTABLE."""
+    outcomes = list(holds)
+    return NOT_TESTABLE if None in outcomes and False not in outcomes else verdict_of_law(outcomes)
+
+
+def _recorded_says(table: Table) -> Part:
+    gains, impacts = _sums(table)
+    return Part(f"{gains} of {impacts:,} impacts in {len(table.rows):,} runs of the engine gained energy in exact "
+                "arithmetic", "", quantities=(("impacts certified", f"{impacts:,}"),))  # fmt: skip
+
+
+def _drawn_says(table: Table) -> Part:
+    least = min(table.column("moved"), default=0.0)
+    return Part(f"{_adverse(table)}; in every family the impact changed the velocity in at least {least:.1%} of the "
+                "cases", "", quantities=(("adverse impacts certified", f"{_sums(table)[1]:,}"),))  # fmt: skip
+
+
+def _adverse(table: Table) -> str:
+    gains, impacts = _sums(table)
+    drawn = f"{impacts:,} random impacts drawn to provoke a gain"
+    return f"{gains} of {drawn} did" if gains else f"nor did {drawn}"
+
+
+def _sums(table: Table) -> tuple[int, int]:
+    return (sum(table.column("gains")), sum(table.column("impacts"))) if table.rows else (0, 0)
+
+
+def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:
+    recorded, drawn = parts
+    return Part(f"{recorded.sentence}; {_adverse(tables['adverse impacts'])}.", "",
+                quantities=(*recorded.quantities, *drawn.quantities))  # fmt: skip
+
+
+def _runs(study: Study) -> Any:
+    return study.run.used_so_far()  # type: ignore[attr-defined]
+
+
+TOPIC = Topic(
+    key="exact-energy", title="Exact energy", question="Does any impact gain energy, even in the last bit?",
+    checks=(
+        Check(key="certified runs", question="", cases=_runs, row=_certified, says=_recorded_says),
+        Check(key="adverse impacts", question="", cases=lambda study: FAMILIES, row=_drawn, says=_drawn_says,
+              rule=verdict_of_families, note=_NOTE),
+    ),
+    says=_answer,
+)  # fmt: skip

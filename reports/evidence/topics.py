@@ -1,4 +1,4 @@
-"""The topics of the report in reading order: each is one line here and a study `function(run, depth, progress)`."""
+"""The topics of the report in reading order: each is one line here, a `Topic` or a function (run, depth, progress)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from importlib import import_module
 from reports.runner import Runner
 from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_of
 
-# key of the finding -> module and function of its study
+# key of the finding -> module and name of its topic
 TOPICS: dict[str, str] = {
     "energy-gains": "verification.laws.study:energy_gains",
     "properties": "verification.laws.study:properties",
@@ -20,7 +20,7 @@ TOPICS: dict[str, str] = {
     "engines": "verification.engines.verdict:engines",
     "haptic-rate": "verification.cost.study:compute",
     "survival": "reports.evidence.survival:compute",
-    "exact-energy": "reports.evidence.exact_energy:compute",  # last: it certifies the runs of all others
+    "exact-energy": "reports.evidence.exact_energy:TOPIC",  # last: it certifies the runs of all others
 }
 
 

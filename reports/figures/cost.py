@@ -24,7 +24,7 @@ from reports.figures.style import (
     line_arguments,
     looks_of,
 )
-from verification.claims.c22_cost import holds
+from verification.claims.speed import costs_more
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
 from verification.cost.impacts import (
@@ -164,7 +164,7 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
 
 def _lost_on(name: str, kernels: Table) -> str:
     """Say for which contact counts of one family IAPB clearly costs more, and by which factor at worst."""
-    slower = [row for row in kernels.records() if holds(row) is False]
+    slower = [row for row in kernels.records() if costs_more(row) is False]
     faster = max((row for row in kernels.records() if row["ratio"]), key=lambda row: float(row["ratio"]))
     won = f"at best, Lemke takes {faster['ratio']:.3g} times as long as IAPB ({_contacts(faster)}). "
     if not slower:

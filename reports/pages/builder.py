@@ -25,7 +25,7 @@ from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import explained
 from reports.pages.uses import anchor, runs_by_user
-from verification.claims.c10_trajectory import FULL
+from verification.claims.peg import FULL
 from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
 from verification.scenes.trace import COORDINATES
 

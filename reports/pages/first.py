@@ -12,7 +12,7 @@ from statistics import median
 
 from reports.pages.quantities import Mark, marks
 from reports.pages.records import Evidence
-from verification.claims.c11_forces import LARGE
+from verification.claims.peg import LARGE
 from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
 
 ERRATA = (

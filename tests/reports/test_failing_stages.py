@@ -18,7 +18,7 @@ from reports.figures.figure import Figure, Panel, Recipe
 from reports.pages.records import Evidence, FailedCases
 from reports.runner import Runner
 from verification import proofs
-from verification.claims import c07_plastic
+from verification.claims import arm
 from verification.cost import effects, impacts
 from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
@@ -55,12 +55,12 @@ def of_claims(patch: Patch, folder: Path) -> list[str]:
     chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
     chosen["C01"] = replace(chosen["C01"], cases=broken(chosen["C01"].cases, lambda study: True))
     patch.setattr(verification.claims, "CLAIMS", chosen)
-    patch.setattr(c07_plastic, "strike", broken(c07_plastic.strike, lambda arm, place, angle, e: (place, angle) ==
-                                                (c07_plastic.PLACES[0], c07_plastic.ANGLES[0])))  # fmt: skip
+    patch.setattr(arm, "strike", broken(arm.strike, lambda arm, place, angle, e: (place, angle) ==
+                                                (arm.PLACES[0], arm.ANGLES[0])))  # fmt: skip
     failures: list[Failure] = []
     first, second = claims.compute(Runner(folder), "quick", nothing, failures)
     assert (first.verdict, first.tables["C01"].rows) == (NOT_COMPUTED, ())
-    trials = 2 * len(c07_plastic.PLACES) * len(c07_plastic.ANGLES) - 1
+    trials = 2 * len(arm.PLACES) * len(arm.ANGLES) - 1
     assert len(second.tables["C07"].rows) == trials - 2
     return [failure.case for failure in failures]
 

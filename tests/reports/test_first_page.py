@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from reports.pages.first import LIMIT, MISSES_SHOWN, Answer, answer, facts
 from reports.pages.records import Evidence
-from verification.claims.c11_forces import LARGE
+from verification.claims.peg import LARGE
 from verification.finding import (
     MIXED,
     NOT_COMPUTED,

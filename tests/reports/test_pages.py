@@ -25,8 +25,8 @@ from reports.pages.terms import TERMS, explained, readable, terms_of
 from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
 from tests.reports.joined import joined
 from verification.claims import CLAIMS
-from verification.claims.c10_trajectory import FULL
 from verification.claims.conditions import full_grid
+from verification.claims.peg import FULL
 from verification.cost.effects import COLUMNS as EFFECTS
 from verification.finding import (
     MIXED,
@@ -291,9 +291,9 @@ def test_pages_too_large_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None:
     claim = CLAIMS["C10"]
     near, far = {"IAPB": 1e-5, "PB": 1e-4, "CBuc": 1e-4}, {"IAPB": 1e-3, "PB": 1e-4, "CBuc": 1e-4}
-    rows = [start.record() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "threshold": FULL}
+    rows = [start.row() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "threshold": FULL}
             for start in full_grid()]  # fmt: skip
-    found = claim.conclude(claim.judge(table_of(claim.columns, rows)))
+    found = claim.conclude(claim.table_of(rows))
     pile = dict.fromkeys(("contacts", "redundant", "time of (21)", "time of pushing"), 10.0)
     piles = [pile | {"rows": "touching", "most contacts that agree": 14, "contacts": contacts,
                      "median distance from the LCP": pulls, "pushing from the LCP": 1e-3 * pulls}

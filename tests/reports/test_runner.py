@@ -14,6 +14,8 @@ from iapb.simulation import INTERRUPTED
 from reports.evidence import exact_energy
 from reports.runner import Runner
 from reports.store import read_run
+from verification.claims.conditions import Condition
+from verification.claims.peg import trace
 
 PEG = load_scene(find_scene("peg_corner")).with_values({"duration": 1.2})
 
@@ -132,9 +134,9 @@ class _UsesOne:
     worlds: tuple[str, ...]
     failures: tuple = ()
 
-    def check(self, study):
+    def finding(self, study):
         for world in self.worlds:
-            study.trace(study.starts()[0], world)
+            trace(study, Condition(), world)
         return self
 
 
@@ -156,7 +158,7 @@ def test_every_engine_run_used_before_is_certified(tmp_path, monkeypatch):
     run = runner(PEG, "IAPB")
     runner(PEG, "PB")
     with runner.recording("a topic") as inside:
-        found = exact_energy.compute(runner, "quick", lambda done, total: None)
+        found = exact_energy.TOPIC(runner, "quick", lambda done, total: None)
     table = found.tables["certified runs"]
     assert table.column("impacts") == [len(run.impacts.step)] and len(run.impacts.step) > 0
     assert not inside and len(runner.used_so_far()) == 2

@@ -1,33 +1,30 @@
-"""Parts shared by the algebraic claims: each trial compares the error of a batch of random impacts with a bound."""
+"""Claims on single impacts: C01 to C06, C08 and C09. A row compares the worst error of a batch with its bound."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import chain, product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import replace
+from fractions import Fraction
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference.exact import bulk_energy_gain
-from verification.claims.claim import Claim
-from verification.finding import Column, Row, Table
-from verification.impacts import Family, Floats, ImpactCase, draw_of_rank, whole_numbers
-
-if TYPE_CHECKING:
-    from verification.claims.study import Study
+from iapb import resolve_impact
+from iapb.run import Run
+from reference.complementarity.laws import newton_lcp
+from reference.complementarity.problem import ImpactProblem
+from reference.exact import bulk_energy_gain, exact_impact, rational_matrix
+from reference.worlds import run_world
+from verification.check import Check, Study
+from verification.claims.conditions import START, Condition, start_conditions
+from verification.claims.peg import place, trace, traces_ahead
+from verification.impacts import Family, Floats, ImpactCase, approaching, draw_of_rank, whole_numbers
+from verification.methods import gram_cholesky, gram_pinv
+from verification.scenes.trace import COORDINATES, Trace
+from verification.table import Row, Table
 
 EPSILON = float(np.finfo(np.float64).eps)
-
-COLUMNS = (
-    Column("part", part=True),
-    Column("coordinates", condition=True),
-    Column("contacts", condition=True),
-    Column("condition number", condition=True),
-    Column("restitution", condition=True),
-    Column("impacts", cases=True),
-    Column("error"),
-    Column("bound"),
-)
 
 
 class Batch(NamedTuple):
@@ -40,65 +37,76 @@ class Batch(NamedTuple):
 
 
 class Measure(NamedTuple):
-    """One part of an algebraic claim: the largest error of a batch, and the largest error allowed."""
+    """One part of a claim: the largest error of a batch, and the largest error allowed.
+
+    Without a bound the batch is computed in rational arithmetic: a quarter as many impacts, with integers only, and no
+    error is allowed.
+    """
 
     error: Callable[[Batch], float]
-    bound: Callable[[Batch], float]
+    bound: Callable[[Batch], float] | None = None
 
 
-class Exact(NamedTuple):
-    """Parts in rational arithmetic, which allow no error; a batch has a quarter as many impacts, with integers only."""
-
-    families: Sequence[Family]
-    restitution: float
-    errors: Mapping[str, Callable[[Batch], float]]
+Draw = Callable[[Family, int, int], Iterator[ImpactCase]]
 
 
-def cases_of(
-    families: Sequence[Family], restitutions: Sequence[float], parts: Iterable[str], exact: Exact | None = None
-) -> list[tuple[str, Family, float]]:
-    """Return (part, family, restitution) of every batch, the exact parts last."""
-    plain = product(families, restitutions, parts)
-    rational = product(exact.families, [exact.restitution], exact.errors) if exact else ()
-    return [(part, family, e) for family, e, part in chain(plain, rational)]
+def batches(
+    key: str, question: str, *, place: str, quantity: str, tolerance: str, families: Sequence[Family],
+    restitutions: Sequence[float], impacts: Mapping[str, int], parts: Mapping[str, Measure],
+    exact: tuple[Sequence[Family], float] = ((), 0.0), says: str, draw: Draw = draw_of_rank,
+) -> Check:  # fmt: skip
+    """Return a claim on batches of random impacts.
 
-
-def trial_of(
-    study: Study, case: tuple[str, Family, float], count: int, parts: Mapping[str, Measure],
-    exact: Exact | None = None, draw: Callable[[Family, int, int], Iterator[ImpactCase]] = draw_of_rank,
-) -> dict[str, Any]:  # fmt: skip
-    """Return the row of one batch of `count` impacts."""
-    part, family, e = case
-    rational = exact is not None and part in exact.errors
-    count = max(count // 4, 4) if rational else count  # at least 4 impacts, so that three batches have at least ten
-    impacts = list((whole_numbers if rational else draw)(family, count, study.seed))
-    batch = Batch(impacts, family, e, study.seed)
-    measure = Measure(exact.errors[part], lambda _: 0.0) if exact and rational else parts[part]
-    return {
-        "part": part, "coordinates": family.coordinates, "contacts": family.contacts,
-        "condition number": None if rational else family.condition_number, "restitution": e, "impacts": count,
-        "error": measure.error(batch), "bound": measure.bound(batch),
-    }  # fmt: skip
-
-
-def algebraic_claim(
-    *, families: Sequence[Family], restitutions: Sequence[float], parts: Mapping[str, Measure],
-    impacts: Mapping[str, int], exact: Exact | None = None,
-    draw: Callable[[Family, int, int], Iterator[ImpactCase]] = draw_of_rank, **words: Any,
-) -> Claim:  # fmt: skip
-    """Return a claim on batches of random impacts; `words` are the other fields of Claim.
-
-    impacts : number of impacts in one batch, by depth; draw : (family, count, seed) -> the impacts of a batch
+    impacts : number of impacts in one batch, by depth; exact : families and e of the parts in rational arithmetic
+    says : the sentence, with the name of a part in braces where its worst error stands
     """
-    return Claim(
-        columns=COLUMNS, cases=lambda study: cases_of(families, restitutions, parts, exact), holds=within_bound,
-        trials=lambda study, case: [trial_of(study, case, impacts[study.depth], parts, exact, draw)], **words,
+    plain, rational = ([part for part in parts if (parts[part].bound is None) is kind] for kind in (False, True))
+    cases = [*product(families, restitutions, plain), *product(exact[0], exact[1:], rational)]
+
+    def row(study: Study, case: tuple[Family, float, str]) -> Row:
+        (family, e, part), count = case, impacts[study.depth]
+        error, bound = parts[part]
+        if bound is None:
+            count = max(count // 4, 4)  # at least 4 impacts, so that three batches have at least ten
+        batch = Batch(list((draw if bound else whole_numbers)(family, count, study.seed)), family, e, study.seed)
+        return {
+            "part": part, "coordinates": family.coordinates, "contacts": family.contacts,
+            "condition number": family.condition_number if bound else None, "restitution": e, "impacts": count,
+            "error": error(batch), "bound": bound(batch) if bound else 0.0,
+        }  # fmt: skip
+
+    return Check(
+        key=key, question=question, place=place, quantity=quantity, tolerance=tolerance, cases=lambda study: cases,
+        row=row, holds=within_bound, parts=["part"], counts=["impacts"],
+        conditions=["coordinates", "contacts", "condition number", "restitution"],
+        says=lambda table: says.format_map(_Worst(table)),
     )  # fmt: skip
+
+
+class _Worst(dict[str, str]):
+    """The text "at most e (allowed b) in n impacts" for each part of a table."""
+
+    def __init__(self, table: Table) -> None:
+        self.table = table
+
+    def __missing__(self, part: str) -> str:
+        rows = self.table.where(part=part).records()
+        if not rows:
+            return "not computed"
+        closest = max(rows, key=lambda row: row["error"] / row["bound"] if row["bound"] else row["error"])
+        impacts = sum(row["impacts"] for row in rows)
+        return f"at most {closest['error']:.1e} (allowed {closest['bound']:.1e}) in {impacts} impacts"
 
 
 def within_bound(row: Row) -> bool | None:
     """Return whether the largest error of a batch is at most its bound; False if the error is not a number."""
     return bool(row["error"] <= row["bound"])
+
+
+def worst(values: Iterable[float]) -> float:
+    """Largest of the values; infinite if a value is not a number."""
+    array = np.fromiter(values, np.float64)
+    return float(np.max(np.where(np.isnan(array), np.inf, array), initial=0.0))
 
 
 def energy_bound(batch: Batch) -> float:
@@ -116,33 +124,369 @@ def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
     return 0.5 * float(velocity @ mass_matrix @ velocity)
 
 
-def energy_gains(instances: Sequence[ImpactCase], velocities: Sequence[Floats]) -> Floats:
+def energy_gains(batch: Batch) -> Floats:
     """Relative energy gain of each impact in double-double arithmetic, plus the error bound of that arithmetic."""
-    masses = np.stack([instance.mass_matrix for instance in instances])
-    before = np.stack([instance.velocity for instance in instances])
-    gain, uncertainty = bulk_energy_gain(masses, before, np.stack(velocities))
+    after = np.stack([resolve_impact(*case.arrays, batch.restitution).velocity for case in batch.impacts])
+    masses = np.stack([case.mass_matrix for case in batch.impacts])
+    gain, uncertainty = bulk_energy_gain(masses, np.stack([case.velocity for case in batch.impacts]), after)
     return gain + uncertainty
 
 
-def quadratic_form(instance: ImpactCase) -> float:
-    """vᵀ Jᵀ W† J v [J] with W = J M⁻¹ Jᵀ, from the independent rows: the form of (18) and (24) without a factor."""
-    rows = instance.contact_jacobian[: instance.rank]
-    closing = rows @ instance.velocity
-    delassus = rows @ np.linalg.solve(instance.mass_matrix, rows.T)
-    return float(closing @ np.linalg.solve(delassus, closing))
+# C01, C02: the energy lost against the quadratic form of (18) and (24)
+
+PASSIVE = "kinetic energy does not rise"
+WITH_HALF = "loss is ½(1 − e²) of the form"
+AS_PRINTED = "loss is (1 − e²) of the form, as printed"
+EXACT_LOSS = "loss is ½(1 − e²) of the form, in rationals"
 
 
-def worst(values: Iterable[float]) -> float:
-    """Largest of the values; infinite if a value is not a number."""
-    array = np.fromiter(values, np.float64)
-    return float(np.max(np.where(np.isnan(array), np.inf, array), initial=0.0))
+def losses(key: str, question: str, place: str, families: Sequence[Family], impacts: Mapping[str, int]) -> Check:
+    """Return the claim that the loss equals the quadratic form: as printed, and with the factor ½ missing in print."""
+    return batches(
+        key, question, place=place, families=families, restitutions=(0.0, 0.5, 0.9, 1.0), impacts=impacts,
+        quantity="Largest relative energy gain; largest difference between the loss and the quadratic form, relative "
+        "to the energy before.",
+        tolerance="Gain: 10 d ε √κ(M), the rounding of the returned velocities. Difference: 100 d ε κ(M), the rounding "
+        "of one solve with M. In rational arithmetic: zero.",
+        parts={
+            PASSIVE: Measure(lambda batch: max(float(energy_gains(batch).max()), 0.0), energy_bound),
+            WITH_HALF: Measure(lambda batch: worst(np.abs(energy_gains(batch) + 0.5 * _shares(batch))), solve_bound),
+            AS_PRINTED: Measure(lambda batch: worst(np.abs(energy_gains(batch) + _shares(batch))), solve_bound),
+            EXACT_LOSS: Measure(lambda batch: worst(_exact_misfit(case, Fraction(batch.restitution))
+                                                    for case in batch.impacts)),
+        },
+        exact=([family for family in families if family.condition_number == families[0].condition_number], 0.5),
+        says=f"Relative energy gain: {{{PASSIVE}}}. The loss is half of the quadratic form printed in {place}. "
+        f"Difference between loss and form with the factor ½: {{{WITH_HALF}}}; without it: {{{AS_PRINTED}}}; with it, "
+        f"in rational arithmetic: {{{EXACT_LOSS}}}.",
+    )  # fmt: skip
 
 
-def summary(table: Table, part: str) -> str:
-    """Return the text `at most e (allowed b) in n impacts` for one part of a claim."""
-    rows = table.where(part=part).records()
-    if not rows:
-        return "not computed"
-    closest = max(rows, key=lambda row: row["error"] / row["bound"] if row["bound"] else row["error"])
-    impacts = sum(row["impacts"] for row in rows)
-    return f"at most {closest['error']:.1e} (allowed {closest['bound']:.1e}) in {impacts} impacts"
+def _shares(batch: Batch) -> Floats:
+    """(1 − e²) vᵀ Jᵀ W† J v with W = J M⁻¹ Jᵀ, from the independent rows, relative to the energy before the impact."""
+    forms, energy = [], []
+    for case in batch.impacts:
+        closing = case.contact_jacobian[: case.rank] @ case.velocity
+        forms.append(float(closing @ np.linalg.solve(_delassus(case), closing)))
+        energy.append(kinetic_energy(case.mass_matrix, case.velocity))
+    return np.asarray((1.0 - batch.restitution**2) * np.array(forms) / np.array(energy))
+
+
+def _delassus(case: ImpactCase) -> Floats:
+    """Return the Delassus matrix of the independent rows."""
+    rows = case.contact_jacobian[: case.rank]
+    return np.asarray(rows @ np.linalg.solve(case.mass_matrix, rows.T))
+
+
+def _exact_misfit(case: ImpactCase, e: Fraction) -> float:
+    """|loss − ½(1 − e²) vᵀJᵀW†Jv|, in rational arithmetic."""
+    after, plastic = exact_impact(*case.arrays, e), exact_impact(*case.arrays, 0)
+    # With e = 0, v⁺ = v − Pv, so vᵀM(v − v⁺) = vᵀMPv is the quadratic form, computed independently of the loss at e.
+    form = -sum((Fraction(x) * p for x, p in zip(case.velocity, plastic.generalized_impulse, strict=True)), Fraction(0))
+    return float(abs(after.energy_before - after.energy_after - (1 - e * e) * form / 2))
+
+
+C01 = losses(
+    "C01", "One frictionless collision never increases kinetic energy, and the loss is the stated quadratic form.",
+    "Theorem 1, equation (18)", [Family(d, 1, 1, k) for d in (1, 3, 12) for k in (1e2, 1e5, 1e8)],
+    {"quick": 16, "full": 200},
+)  # fmt: skip
+C02 = losses(
+    "C02", "Redundant simultaneous collisions never increase kinetic energy; the loss is the stated quadratic form.",
+    "Theorem 2, equation (24)",
+    [Family(*size, k) for size in ((3, 4, 2), (3, 6, 3), (6, 20, 4), (12, 60, 8)) for k in (1e2, 1e5)],
+    {"quick": 12, "full": 150},
+)  # fmt: skip
+
+
+# C03: all rows against independent rows
+
+_ROWS = [Family(*size, k) for size in ((3, 4, 2), (3, 6, 3), (6, 12, 4)) for k in (1e1, 1e3, 1e5)]
+
+
+def _row_bound(batch: Batch) -> float:
+    """Return 100 d ε max(κ(M), κ(W)): both methods solve with M and with W, the Delassus matrix of independent rows."""
+    condition = max(batch.family.condition_number, *(np.linalg.cond(_delassus(case)) for case in batch.impacts))
+    return float(100.0 * batch.family.coordinates * EPSILON * condition)
+
+
+def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Measure:
+    """Distance |v⁺(all rows) − v⁺(independent rows)| in the kinetic metric, relative to |v⁻|."""
+
+    def distance(case: ImpactCase, e: float) -> float:
+        (mass, rows, velocity), rank = case.arrays, case.rank
+        everything, chosen = method(mass, rows, velocity, e), gram_cholesky(mass, rows[:rank], velocity, e)
+        return float(np.sqrt(kinetic_energy(mass, everything - chosen) / kinetic_energy(mass, velocity)))
+
+    return Measure(lambda batch: worst(distance(case, batch.restitution) for case in batch.impacts), _row_bound)
+
+
+def _differing(velocities: Callable[[ImpactCase, Fraction], tuple[Any, Any]]) -> Measure:
+    """Number of impacts in which two velocities in rational arithmetic are not identical."""
+
+    def count(batch: Batch) -> float:
+        pairs = (velocities(case, Fraction(batch.restitution)) for case in batch.impacts)
+        return float(sum(tuple(one) != tuple(other) for one, other in pairs))
+
+    return Measure(count)
+
+
+def _by_pseudo_inverse(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
+    """Return v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v, the printed formula (21), and v⁺ from independent rows."""
+    mass, rows, v = (rational_matrix("impact", array) for array in case.arrays)
+    closing = pseudo_inverse(rows * mass.solve(rows.transpose())) * (rows * v)
+    change = mass.solve(rows.transpose() * closing).entries()
+    after = (_fraction(a) - (1 + e) * _fraction(b) for a, b in zip(v.entries(), change, strict=True))
+    return after, exact_impact(*case.arrays, e).velocity
+
+
+def pseudo_inverse(matrix: Any) -> Any:
+    """Return the Moore-Penrose inverse of a rational matrix that is not zero.
+
+    W = C R with the independent columns C and the reduced echelon form R; W† = Rᵀ(R Rᵀ)⁻¹(CᵀC)⁻¹Cᵀ. Source: Ben-Israel
+    and Greville, Generalized Inverses (2003), theorem 1.5 (MacDuffee).
+    """
+    reduced, rank = matrix.rref()
+    make, height, width = type(matrix), matrix.nrows(), matrix.ncols()
+    pivots = [next(j for j in range(width) if reduced[i, j] != 0) for i in range(rank)]
+    columns = make(height, rank, [matrix[i, j] for i in range(height) for j in pivots])
+    echelon = make(rank, width, [reduced[i, j] for i in range(rank) for j in range(width)])
+    left = (columns.transpose() * columns).solve(columns.transpose())
+    return echelon.transpose() * (echelon * echelon.transpose()).solve(left)
+
+
+def _fraction(x: Any) -> Fraction:
+    return Fraction(int(x.p), int(x.q))
+
+
+def _reversed_rows(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
+    mass, rows, velocity = case.arrays
+    return exact_impact(mass, rows[::-1], velocity, e).velocity, exact_impact(mass, rows, velocity, e).velocity
+
+
+C03 = batches(
+    "C03", "The pseudo-inverse gives the same state as first removing the redundant rows.",
+    place="Section V-B, equations (25) and (33)",
+    quantity="Distance of the two outcomes in the kinetic metric, relative to the velocity before; in rational "
+    "arithmetic the number of impacts whose outcomes are not identical.",
+    tolerance="In doubles 100 d ε times the larger of κ(M) and κ(W), because both methods solve with these matrices (W "
+    "is the Delassus matrix of the independent rows). In rational arithmetic zero.",
+    families=_ROWS, restitutions=(0.5,), impacts={"quick": 12, "full": 150}, exact=(_ROWS[::3], 0.5),
+    parts={
+        "pseudo-inverse, in doubles": _rows_apart(gram_pinv),
+        "orthonormal basis, in doubles": _rows_apart(lambda *arrays: resolve_impact(*arrays).velocity),
+        "pseudo-inverse, in rationals": _differing(_by_pseudo_inverse),
+        "other independent rows, in rationals": _differing(_reversed_rows),
+    },
+    says="Number of states that differ in rational arithmetic: {pseudo-inverse, in rationals}; with another choice of "
+    "independent rows: {other independent rows, in rationals}. Relative difference in doubles, printed formula: "
+    "{pseudo-inverse, in doubles}; factored form: {orthonormal basis, in doubles}.",
+)  # fmt: skip
+
+
+# C04: e = 1 conserves energy
+
+_ELASTIC = [Family(*size, k) for size in ((1, 1, 1), (3, 1, 1), (3, 6, 3), (6, 12, 4), (12, 60, 8))
+            for k in (1e1, 1e4, 1e8)]  # fmt: skip
+
+
+def _exact_change(batch: Batch) -> float:
+    impacts = [exact_impact(*case.arrays, 1) for case in batch.impacts]
+    return worst(float(abs(impact.energy_after - impact.energy_before)) for impact in impacts)
+
+
+C04 = batches(
+    "C04", "With e = 1 kinetic energy is conserved.", place="Sections V-A and V-B",
+    quantity="Largest relative change of kinetic energy, gain or loss.",
+    tolerance="100 d ε κ(M) in doubles, the rounding of the factorization of M; it causes losses, never gains. In "
+    "rational arithmetic zero.",
+    families=_ELASTIC, restitutions=(1.0,), impacts={"quick": 12, "full": 200}, exact=(_ELASTIC[::3], 1.0),
+    parts={"in doubles": Measure(lambda batch: worst(np.abs(energy_gains(batch))), solve_bound),
+           "in rationals": Measure(_exact_change)},
+    says="Relative change of energy in doubles: {in doubles}. Change of energy [J] in rational arithmetic: {in "
+    "rationals}.",
+)  # fmt: skip
+
+
+# C05: one contact against complementarity
+
+def _from_lcp(solver: str) -> Measure:
+    """Largest |p − p_LCP| / p_LCP, where p_LCP is the multiplier of Newton's LCP at one approaching contact."""
+
+    def difference(case: ImpactCase, e: float) -> float:
+        ours = resolve_impact(*case.arrays, e).impulses
+        theirs = newton_lcp(ImpactProblem.from_impact(*case.arrays, e), solver).impulse
+        return float(np.abs(ours - theirs)[0] / np.abs(theirs)[0])
+
+    return Measure(lambda batch: worst(difference(approaching(case), batch.restitution) for case in batch.impacts),
+                   solve_bound)  # fmt: skip
+
+
+C05 = batches(
+    "C05", "At a single contact the impulse equals that of the complementarity formulation.",
+    place="Section V-A, note to (19)",
+    quantity="Relative difference between the impulse and the multiplier of 0 <= p ⟂ γ⁺ + eγ⁻ >= 0.",
+    tolerance="100 d ε κ(M): both methods divide by nᵀM⁻¹n, each with its own solve.",
+    families=[Family(d, 1, 1, k) for d in (1, 3, 12) for k in (1e1, 1e3, 1e5)],
+    restitutions=(0.0, 0.3, 1.0), impacts={"quick": 8, "full": 100},
+    parts={f"LCP by {solver}": _from_lcp(solver) for solver in ("daqp", "lemke")},
+    says="Relative difference of the impulses, for each LCP solver: daqp: {LCP by daqp}; lemke: {LCP by lemke}.",
+)  # fmt: skip
+
+
+# C06: other coordinates
+
+MASS_CONDITION = 1e2
+# Condition numbers of the change of coordinates. From metres to millimetres, with radians kept, it is about 1e3.
+_CHANGES = [Family(*size, k) for size in ((3, 1, 1), (3, 6, 3), (6, 12, 4)) for k in (1e0, 1e3)]
+
+
+def _draw_for_changes(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
+    """Draw impacts with κ(M) = MASS_CONDITION; the family's condition number is that of the change of coordinates."""
+    return draw_of_rank(family._replace(condition_number=MASS_CONDITION), count, seed)
+
+
+def _coordinates_apart(batch: Batch) -> float:
+    """Largest distance of two outcomes for q = T r: solved for q̇, and solved for ṙ and transformed back."""
+    family = batch.family
+    rng = np.random.default_rng([batch.seed, family.coordinates, family.contacts])
+    changes = [random_change(rng, family.coordinates, family.condition_number) for _ in batch.impacts]
+    return worst(_distance(case, change, batch.restitution)
+                 for case, change in zip(batch.impacts, changes, strict=True))  # fmt: skip
+
+
+def random_change(rng: np.random.Generator, size: int, condition_number: float) -> Floats:
+    """Return an invertible (d, d) matrix of this condition number, neither symmetric nor orthogonal."""
+    left, _ = np.linalg.qr(rng.standard_normal((size, size)))
+    right, _ = np.linalg.qr(rng.standard_normal((size, size)))
+    return (left * np.logspace(0.0, -np.log10(condition_number), size)) @ right
+
+
+def _distance(case: ImpactCase, change: Floats, e: float) -> float:
+    """|v⁺ − T w⁺| in the kinetic metric relative to |v⁻|, with M' = TᵀMT, J' = JT, w = T⁻¹v."""
+    mass, rows, velocity = case.arrays
+    here, new_mass = resolve_impact(mass, rows, velocity, e).velocity, change.T @ mass @ change
+    there = resolve_impact(0.5 * (new_mass + new_mass.T), rows @ change, np.linalg.solve(change, velocity), e)
+    apart = here - change @ there.velocity
+    return float(np.sqrt(kinetic_energy(mass, apart) / kinetic_energy(mass, velocity)))
+
+
+def _sheared(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
+    mass, rows, velocity = case.arrays
+    shear = np.eye(len(velocity)) + np.triu(np.ones_like(mass), 1)
+    unshear = np.round(np.linalg.inv(shear))  # integers, because the determinant is 1
+    there = exact_impact(shear.T @ mass @ shear, rows @ shear, unshear @ velocity, e).velocity
+    return exact_impact(mass, rows, velocity, e).velocity, shear.astype(int).astype(object) @ np.array(there)
+
+
+C06 = batches(
+    "C06", "The outcome of a collision does not depend on the coordinates chosen.", place="Section V-A",
+    quantity="Distance in the kinetic metric between the outcome and the one computed in other coordinates and "
+    "transformed back; in rational arithmetic the number of outcomes that differ.",
+    tolerance="100 d ε κ(M) κ(T)², because the transformation T gives the mass matrix TᵀMT, worse conditioned by "
+    "κ(T)². In rational arithmetic zero.",
+    families=_CHANGES, restitutions=(0.0, 0.7), impacts={"quick": 12, "full": 150}, exact=(_CHANGES[::2], 0.5),
+    parts={
+        "random change of coordinates, in doubles": Measure(_coordinates_apart, lambda batch: (
+            100.0 * batch.family.coordinates * EPSILON * MASS_CONDITION * batch.family.condition_number**2)),
+        "shear by whole numbers, in rationals": _differing(_sheared),
+    },
+    draw=_draw_for_changes,
+    says="Relative difference of the outcomes after transforming back: {random change of coordinates, in doubles}. "
+    "Number of outcomes that differ in rational arithmetic: {shear by whole numbers, in rationals}.",
+)  # fmt: skip
+
+
+# C08: passive for every e in [-1, 1], scaled and spread as well
+
+RANDOM = "random impacts"
+RENDERED = {"impacts of the peg, scaled to the device": "scale", "impacts of the peg, spread over steps": "spread"}
+_PASSIVE = batches(
+    "C08", "The resolution is passive for every e in [-1, 1]; scaling and spreading the impulses stay inside.",
+    place="Section VI", quantity="Largest relative gain of the tool's kinetic energy in one impact.",
+    tolerance="10 d ε √κ(M) for random impacts; 100 ε for the peg, whose mass matrix is diagonal.",
+    families=[Family(*size, k) for size in ((1, 1, 1), (3, 6, 3), (6, 20, 4), (12, 60, 8)) for k in (1e2, 1e6)],
+    restitutions=(-1.0, -0.9, -0.5, 0.0, 0.5, 0.9, 1.0), impacts={"quick": 8, "full": 150},
+    parts={RANDOM: Measure(lambda batch: worst(energy_gains(batch)), energy_bound)},
+    says=f"Relative energy gain: {RANDOM} {{{RANDOM}}}; {'; '.join(f'{part} {{{part}}}' for part in RENDERED)}.",
+)  # fmt: skip
+
+
+def _random_or_peg(study: Study, case: tuple[Any, ...]) -> Any:
+    """Return the row of one batch of random impacts, or of the impacts of all runs of the peg."""
+    if len(case) > 1:
+        return _PASSIVE.row(study, case)
+    starts, rendering = start_conditions(study.depth), RENDERED[case[0]]
+    traces_ahead(study, starts, [("IAPB", rendering)])
+    traces = list(study.each(starts, lambda start: [trace(study, start, "IAPB", rendering)]))
+    return {"part": case[0], "coordinates": 3, "restitution": 0.0,
+            "impacts": sum(len(one.impact_step) for one in traces),
+            "error": worst(map(_largest_gain, traces)), "bound": 100.0 * EPSILON}  # fmt: skip
+
+
+def _largest_gain(trace: Trace) -> float:
+    """Largest energy gain of an impact of the run, relative to the energy before that impact."""
+    return worst(-trace.energy_lost / trace.kinetic_energy[trace.impact_step])
+
+
+C08 = replace(_PASSIVE, row=_random_or_peg,
+              cases=lambda study: [*_PASSIVE.cases(study), *((part,) for part in RENDERED)])  # fmt: skip
+
+
+# C09: e = -1 is the penalty-based simulation
+
+RESOLVER = "velocity after an impact with e = -1"
+TRAJECTORY = "trajectory with e = -1"
+ALMOST = "trajectory at the next double above e = -1"
+JUST_ABOVE = float(np.nextafter(-1.0, 0.0))
+# An impulse of 1e-16 of its usual size moves the 2 kg peg by 1e-17 m; contacts may amplify this distance [m, rad].
+SAME_TRAJECTORY = 1e-11
+
+
+def _without_impulse(study: Study, case: Family | Condition) -> Iterator[Row]:
+    """Yield the row of one batch; or, per coordinate, the distances of two trajectories from that of PB."""
+    if isinstance(case, Family):
+        impacts = list(draw_of_rank(case, {"quick": 20, "full": 300}[study.depth], study.seed))
+        moved = worst(float(np.abs(resolve_impact(*i.arrays, -1.0).velocity - i.velocity).max()) for i in impacts)
+        yield {"part": RESOLVER, "coordinate": "all"} | dict.fromkeys(Condition().row()) | {
+            "contacts": case.contacts, "impacts": len(impacts), "error": moved, "bound": 0.0}  # fmt: skip
+        return
+    penalty = trace(study, case, "PB")
+    for part, e, bound in ((TRAJECTORY, -1.0, 0.0), (ALMOST, JUST_ABOVE, SAME_TRAJECTORY)):
+        run = _run_with(study, case, e)
+        apart = np.maximum(np.abs(run.device_q - penalty.device).max(0), np.abs(run.q - penalty.tool).max(0))
+        for coordinate, error in zip(COORDINATES, apart, strict=True):
+            yield {"part": part, "coordinate": coordinate, **case.row(), "impacts": len(run.impacts.step),
+                   "error": float(error), "bound": bound}  # fmt: skip
+
+
+def _run_with(study: Study, start: Condition, restitution: float) -> Run:
+    """Run IAPB with a negative e. Scene files may not have a negative e, so this run is not stored."""
+    scene = place(study, start)
+    contact = scene.contact.model_copy(update={"restitution": restitution})
+    return run_world(scene.model_copy(update={"contact": contact}), "IAPB", "full")
+
+
+def _without_impulse_says(table: Table) -> str:
+    impacts, exactly, almost = (table.where(part=part) for part in (RESOLVER, TRAJECTORY, ALMOST))
+    once = almost.where(coordinate="x")
+    return (
+        f"{sum(impacts.column('impacts'))} impacts with e = -1 change no velocity (largest change "
+        f"{max(impacts.column('error')):.0e}). {len(once.rows)} trajectories with e = -1 differ from PB by at most "
+        f"{max(exactly.column('error')):.0e}. With the next double above e = -1 the {len(once.rows)} trajectories "
+        f"resolve {sum(once.column('impacts'))} collisions and differ from PB by up to "
+        f"{max(almost.column('error')):.0e} m or rad, because colliding steps have no penalty force."
+    )
+
+
+C09 = Check(
+    key="C09", question="With e = -1 the simulation is the penalty-based simulation.", place="Section VI",
+    quantity="Largest change of velocity by an impact with e = -1; largest distance between the trajectories of "
+    "device and tool and those of PB, by coordinate.",
+    tolerance="Zero at e = -1. At the next double above it 1e-11 m or rad: impulses change by 1e-16 of their size, and "
+    "contacts amplify this.",
+    cases=lambda study: [Family(1, 1, 1, 1e0), Family(3, 6, 3, 1e2), Family(6, 20, 4, 1e4), Family(12, 60, 8, 1e8),
+                         *start_conditions(study.depth)],
+    row=_without_impulse, holds=within_bound, says=_without_impulse_says, parts=["part", "coordinate"],
+    counts=["impacts"], conditions=[*START, "contacts"],
+)  # fmt: skip

@@ -13,9 +13,14 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from iapb.scene import Scene
-from verification.finding import Column, Region
+from verification.region import Region
 from verification.scenes.trace import HALF_SIZE
 
+UNITS = {
+    "tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",
+    "approach_velocity": "m/s", "force_limit": "F_limit",
+}  # fmt: skip
+START = ("tilt", "clearance", "travel", "friction", "approach_velocity")  # conditions that most claims vary
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 
 # The conditions that each world ignores: one run of a world serves all values of these conditions.
@@ -25,10 +30,9 @@ IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("approach_vel
 
 @dataclass(frozen=True)
 class Condition:
-    """One variation of the peg scene; friction, stiffness and damping are those of the walls.
+    """One variation of the peg scene, with the units of UNITS; friction, stiffness and damping are those of the walls.
 
-    tilt [rad]; clearance to the wall and travel to the floor [m]; stiffness [N/m]; damping [N s/m];
-    approach_velocity above which a contact collides [m/s]; force_limit of the device as a multiple of the paper's limit
+    A contact collides above `approach_velocity`; `force_limit` of the device is a multiple of the paper's limit.
     """
 
     tilt: float = 0.015
@@ -48,21 +52,18 @@ class Condition:
 
     def seen_by(self, world: str, rendering: str) -> Condition:
         """Return the condition with the default for every value that the world ignores."""
-        default, ignored = Condition(), IGNORED[world]
-        if rendering == "full":
-            ignored = (*ignored, "force_limit")
-        return replace(self, **{name: getattr(default, name) for name in ignored})
+        ignored = IGNORED[world] if rendering != "full" else (*IGNORED[world], "force_limit")
+        return replace(self, **{name: getattr(Condition(), name) for name in ignored})
 
-    def record(self) -> dict[str, float]:
-        """Return the values of the condition by column name."""
-        return asdict(self)
+    def row(self, *names: str) -> dict[str, float]:
+        """Return these values of the condition as cells of a row, by default those of START."""
+        return {f"{name} [{UNITS[name]}]" if UNITS[name] else name: getattr(self, name) for name in names or START}
 
     def place(self, scene: Scene) -> Scene:
         """Return the scene with the values of this condition."""
-        half = np.array(HALF_SIZE)
         c, s = abs(np.cos(self.tilt)), abs(np.sin(self.tilt))
-        x = self.clearance + half[0] * c + half[1] * s
-        y = -(self.travel + half[0] * s + half[1] * c)
+        x = self.clearance + HALF_SIZE[0] * c + HALF_SIZE[1] * s
+        y = -(self.travel + HALF_SIZE[0] * s + HALF_SIZE[1] * c)
         return scene.with_values({
             "bodies.peg.position": [float(x), float(y), self.tilt],
             "contact.friction": self.friction,
@@ -93,8 +94,7 @@ DAMPINGS = (0.0, 12.5, 25.0, 50.0, 100.0)
 def start_conditions(depth: str) -> tuple[Condition, ...]:
     """Return all tilts x clearances x approach velocities, more travels at three tilts, more frictions at all tilts."""
     grid = [Condition(tilt, clearance) for tilt in TILTS[depth] for clearance in CLEARANCES[depth]]
-    few = (0.0, 0.03, 0.1)
-    travels = [Condition(tilt, travel=travel) for tilt in few for travel in TRAVELS[depth]]
+    travels = [Condition(tilt, travel=travel) for tilt in (0.0, 0.03, 0.1) for travel in TRAVELS[depth]]
     frictions = [Condition(tilt, friction=friction) for tilt in TILTS[depth] for friction in FRICTIONS]
     approaches = [replace(start, approach_velocity=speed) for start in grid for speed in APPROACH_VELOCITIES]
     return tuple(dict.fromkeys(grid + travels + frictions + approaches))
@@ -118,6 +118,9 @@ def limited_conditions(depth: str) -> tuple[Condition, ...]:
     return tuple(starts + [replace(start, force_limit=TIGHT) for start in plain])
 
 
+# Range of the values tested for the start of the peg. A rigid world ignores all other conditions.
+RANGES = {name: (min(values["full"]), max(values["full"]))
+          for name, values in (("tilt", TILTS), ("clearance", CLEARANCES), ("travel", TRAVELS))}  # fmt: skip
 PATIENCE = 1000  # 1000 starts in a row miss a region with a hundredth of all starts once in 23,000 draws
 
 
@@ -130,48 +133,21 @@ def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) ->
     its logarithm. All conditions vary at once. Values are rounded to four digits, so that every machine gets the same
     ones. If `PATIENCE` starts in a row miss a thin region, further starts are drawn inside that region.
     """
-    rng, found = np.random.default_rng(seed), list[Condition]()
+    rng, found, missed = np.random.default_rng(seed), list[Condition](), 0
     ends = {name: region.ends(name, [getattr(condition, name) for condition in tested]) for name in UNITS}
-    missed = 0
     while len(found) < count:
         shares = dict(zip(UNITS, rng.random(len(UNITS)), strict=True))
-        start = {name: _between(*(START if missed < PATIENCE else ends)[name], shares[name]) for name in START}
-        if not all(ends[name][0] <= start[name] <= ends[name][1] for name in START) and missed < PATIENCE:
+        patient = missed < PATIENCE
+        start = {name: _between(*(RANGES if patient else ends)[name], shares[name]) for name in RANGES}
+        if patient and not all(ends[name][0] <= start[name] <= ends[name][1] for name in RANGES):
             missed += 1
             continue
-        missed = missed if missed >= PATIENCE else 0
-        others = {name: _between(*ends[name], shares[name], by_decades=name in BY_DECADES)
-                  for name in UNITS if name not in START}  # fmt: skip
+        missed = 0 if patient else missed
+        others = {name: _between(*ends[name], shares[name], by_decades=name == "approach_velocity")
+                  for name in UNITS if name not in RANGES}  # fmt: skip
         found.append(Condition(**start, **others))
     return found
 
 
 def _between(low: float, high: float, share: float, by_decades: bool = False) -> float:
     return float(f"{low * (high / low) ** share if by_decades else low + share * (high - low):.4g}")
-
-
-def wall_conditions() -> tuple[Condition, ...]:
-    """Return every stiffness and damping of the walls at two tilts (C17)."""
-    return tuple(
-        Condition(tilt, stiffness=stiffness, damping=damping)
-        for tilt in (0.0, 0.1) for stiffness in STIFFNESSES for damping in DAMPINGS
-    )  # fmt: skip
-
-
-UNITS = {
-    "tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",
-    "approach_velocity": "m/s", "force_limit": "F_limit",
-}  # fmt: skip
-
-# Range of the values tested for the start of the peg. A rigid world ignores all other conditions.
-START = {name: (min(values["full"]), max(values["full"]))
-         for name, values in (("tilt", TILTS), ("clearance", CLEARANCES), ("travel", TRAVELS))}  # fmt: skip
-BY_DECADES = ("approach_velocity",)
-
-
-def columns(*names: str) -> tuple[Column, ...]:
-    """Return the condition columns of these names."""
-    return tuple(Column(name, UNITS[name], condition=True) for name in names)
-
-
-START_COLUMNS = columns("tilt", "clearance", "travel", "friction", "approach_velocity")

@@ -3,20 +3,13 @@
 import numpy as np
 import pytest
 
-from verification.claims import (
-    CLAIMS,
-    c11_forces,
-    c12_saturate_spread,
-    c13_limited_trajectory,
-    c15_settling,
-    c18_false_collisions,
-)
-from verification.finding import REFUTED, REPRODUCED, Column, table_of, verdict_of_trials
+from verification.claims import CLAIMS, peg, socket
+from verification.finding import REFUTED, REPRODUCED, verdict_of_trials
 
 RENDERED = {"saturate": 3e-3, "scale": 2e-3, "spread": 1e-3}
 NEAR, FAR = 1e-4, 1e-3  # [m] or [rad]
 FILTERED = {
-    "part": c18_false_collisions.REACHES, "coherence_distance": 6.0, "speed × step": 1.2,
+    "part": socket.REACHES, "coherence_distance": 6.0, "speed × step": 1.2,
     "false collisions without filters": 26,
 }  # fmt: skip
 
@@ -27,21 +20,21 @@ PLANTED = {
     **{name: ({"error": 0.0, "bound": 0.0}, {"error": 1e-3, "bound": 0.0}) for name in ("C06", "C08", "C09")},
     "C07": ({"expected": "all", "share lost": 1.0 - 1e-15}, {"expected": "all", "share lost": 0.9}),
     "C11": (
-        {"part": c11_forces.CLOSEST, "IAPB": NEAR, "PB": FAR, "CBuc": FAR},
-        {"part": c11_forces.CLOSEST, "IAPB": FAR, "PB": FAR, "CBuc": NEAR},
+        {"part": peg.CLOSEST, "IAPB": NEAR, "PB": FAR, "CBuc": FAR},
+        {"part": peg.CLOSEST, "IAPB": FAR, "PB": FAR, "CBuc": NEAR},
     ),
     "C12": (
-        {"part": f"x: {c12_saturate_spread.LEAST}", "impacts limited": 0.5} | RENDERED,
-        {"part": f"x: {c12_saturate_spread.MOST}", "impacts limited": 0.5} | RENDERED | {"scale": 1.0},
+        {"part": f"x: {peg.LEAST}", "impacts limited": 0.5} | RENDERED,
+        {"part": f"x: {peg.MOST}", "impacts limited": 0.5} | RENDERED | {"scale": 1.0},
     ),
     "C13": (
-        {"coordinate": c13_limited_trajectory.PENETRATION, "IAPB": NEAR, "PB": FAR},
-        {"coordinate": c13_limited_trajectory.PENETRATION, "IAPB": FAR, "PB": NEAR},
+        {"coordinate": peg.PENETRATION, "IAPB": NEAR, "PB": FAR},
+        {"coordinate": peg.PENETRATION, "IAPB": FAR, "PB": NEAR},
     ),
     "C14": ({"coordinate": "x", "IAPB": 15.0, "PB": 5.0}, {"coordinate": "x", "IAPB": 4.0, "PB": 5.0}),
     "C15": (
-        {"part": c15_settling.SETTLES, "IAPB": 0.5, "PB": np.inf},
-        {"part": c15_settling.SETTLES, "IAPB": np.inf, "PB": 2.0},
+        {"part": peg.SETTLES, "IAPB": 0.5, "PB": np.inf},
+        {"part": peg.SETTLES, "IAPB": np.inf, "PB": 2.0},
     ),
     "C16": (
         {"rendering": "spread", "distance": 0.0, "angle": 1e-15, "impacts limited": 1.0},
@@ -70,11 +63,6 @@ PLANTED = {
 }
 
 
-def judged(claim, trial):
-    table = table_of([Column(name) for name in trial], [trial])
-    return claim.judge(table)
-
-
 def test_every_claim_has_planted_trials():
     assert set(PLANTED) == set(CLAIMS)
 
@@ -82,8 +70,8 @@ def test_every_claim_has_planted_trials():
 @pytest.mark.parametrize("name", sorted(PLANTED))
 def test_judge_confirms_and_refutes(name):
     agrees, contradicts = PLANTED[name]
-    assert verdict_of_trials(judged(CLAIMS[name], agrees).holds) == REPRODUCED
-    assert verdict_of_trials(judged(CLAIMS[name], contradicts).holds) == REFUTED
+    assert verdict_of_trials(CLAIMS[name].table_of([agrees]).holds) == REPRODUCED
+    assert verdict_of_trials(CLAIMS[name].table_of([contradicts]).holds) == REFUTED
 
 
 @pytest.mark.parametrize(
@@ -91,18 +79,18 @@ def test_judge_confirms_and_refutes(name):
     [
         ("C07", {"expected": "part", "share lost": 1.0}),
         ("C07", {"expected": "part", "share lost": 0.0}),
-        ("C11", {"part": c11_forces.LARGE, "IAPB": 5.0, "PB": 8.0, "CBuc": 8.0}),
-        ("C11", {"part": c11_forces.BALANCE, "IAPB": 0.1, "hand": -0.32}),
-        ("C15", {"part": c15_settling.FEWER, "IAPB": 2, "PB": 2}),
-        ("C15", {"part": c15_settling.NO_MORE, "IAPB": 3, "PB": 2}),
-        ("C15", {"part": c15_settling.SETTLES, "IAPB": 1.5, "PB": 1.5}),
+        ("C11", {"part": peg.LARGE, "IAPB": 5.0, "PB": 8.0, "CBuc": 8.0}),
+        ("C11", {"part": peg.BALANCE, "IAPB": 0.1, "hand": -0.32}),
+        ("C15", {"part": peg.FEWER, "IAPB": 2, "PB": 2}),
+        ("C15", {"part": peg.NO_MORE, "IAPB": 3, "PB": 2}),
+        ("C15", {"part": peg.SETTLES, "IAPB": 1.5, "PB": 1.5}),
         ("C19", {"late calls": 2, "contacts": 30000}),
         ("C13", {"coordinate": "x", "IAPB": FAR, "PB": NEAR, "CBuc": FAR}),
         ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 1.0}),
         ("C20", {"virtual damping": 1.05, "energy from the wall": 0.0, "wall's turnover": 1.0}),
         ("C20", {"virtual damping": None, "energy from the wall": 0.0, "wall's turnover": 1.0}),
-        ("C18", FILTERED | {"part": c18_false_collisions.CLUSTERING, "coherence_distance": 0, "false collisions": 41}),
-        ("C18", FILTERED | {"part": c18_false_collisions.SHORT, "coherence_distance": 2, "false collisions": 26}),
+        ("C18", FILTERED | {"part": socket.CLUSTERING, "coherence_distance": 0, "false collisions": 41}),
+        ("C18", FILTERED | {"part": socket.SHORT, "coherence_distance": 2, "false collisions": 26}),
     ],
 )
 def test_every_part_of_a_claim_can_fail(name, trial):
@@ -112,11 +100,11 @@ def test_every_part_of_a_claim_can_fail(name, trial):
 @pytest.mark.parametrize(
     ("name", "trial"),
     [
-        ("C11", {"part": c11_forces.BALANCE, "IAPB": None, "hand": -0.32}),
+        ("C11", {"part": peg.BALANCE, "IAPB": None, "hand": -0.32}),
         ("C12", {"part": "x", "impacts limited": 0.0} | RENDERED),
         ("C14", {"coordinate": "theta", "IAPB": 1e-9, "PB": 0.0}),
-        ("C15", {"part": c15_settling.FEWER, "IAPB": 0, "PB": 0}),
-        ("C15", {"part": c15_settling.SETTLES, "IAPB": np.inf, "PB": np.inf}),
+        ("C15", {"part": peg.FEWER, "IAPB": 0, "PB": 0}),
+        ("C15", {"part": peg.SETTLES, "IAPB": np.inf, "PB": np.inf}),
         ("C21", {"impulses settle after": np.inf, "penalty settles after": np.inf}),
         ("C16", {"rendering": "scale", "distance": 1e-4, "angle": 0.0, "impacts limited": 0.0}),
         ("C18", FILTERED | {"coherence_distance": 1.0, "false collisions": 26}),

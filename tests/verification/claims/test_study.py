@@ -4,9 +4,11 @@ import pytest
 
 from iapb import find_scene, load_scene
 from iapb.errors import ArgumentError
-from verification.claims import Study, check_claims, study
-from verification.claims.conditions import Condition, drawn
-from verification.claims.study import run_directly
+from reference.worlds import run_world
+from verification.check import Study
+from verification.claims import check_claims, peg
+from verification.claims.conditions import Condition, drawn, start_conditions
+from verification.claims.peg import trace
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED, WHERE, Region
 
 FEW = tuple(Condition(tilt, friction=0.1) for tilt in (0.0, *(0.1 + 0.01 * n for n in range(10))))
@@ -16,12 +18,12 @@ SWAPPED = {"IAPB": "PB", "PB": "IAPB"}
 @pytest.fixture
 def few(monkeypatch):
     """Eleven starts only, one device limit, worlds that are compiled: seconds, not a minute."""
-    monkeypatch.setattr(study, "start_conditions", lambda depth: FEW)
-    monkeypatch.setattr(study, "limited_conditions", lambda depth: FEW)
+    monkeypatch.setattr(peg, "start_conditions", lambda depth: FEW)
+    monkeypatch.setattr(peg, "limited_conditions", lambda depth: FEW)
 
 
 def swapped(scene, world, rendering):
-    return run_directly(scene, SWAPPED[world], "full")
+    return run_world(scene, SWAPPED[world], "full")
 
 
 def test_each_simulation_is_run_once(few):
@@ -29,7 +31,7 @@ def test_each_simulation_is_run_once(few):
 
     def run(scene, world, rendering):
         calls.append((scene.source_text, world, rendering))
-        return run_directly(scene, world, rendering)
+        return run_world(scene, world, rendering)
 
     check_claims(run=run, ids=["C14", "C16"])
     assert calls and len(calls) == len(set(calls))
@@ -43,7 +45,7 @@ def test_a_region_that_the_shared_sequence_misses_gets_starts_of_its_own():
 
 def test_rigid_worlds_do_not_see_friction_or_penalties():
     seen = []
-    run = run_directly(load_scene(find_scene("peg_corner")), "PB", "full")
+    run = run_world(load_scene(find_scene("peg_corner")), "PB", "full")
 
     def remember(scene, world, rendering):
         seen.append((world, scene.contact.friction, scene.contact.stiffness))
@@ -51,8 +53,8 @@ def test_rigid_worlds_do_not_see_friction_or_penalties():
 
     asked = Study(remember)
     for condition in (Condition(friction=0.3), Condition(stiffness=250.0), Condition()):
-        asked.trace(condition, "ideal")
-    asked.trace(Condition(friction=0.3), "PB")
+        trace(asked, condition, "ideal")
+    trace(asked, Condition(friction=0.3), "PB")
     assert seen == [("ideal", 0.0, 1000.0), ("PB", 0.3, 1000.0)]
 
 
@@ -68,21 +70,21 @@ def test_runs_made_ahead_are_not_made_again_and_change_no_number(few):
     made, here = [], []
 
     def ahead(wanted):
-        found = [run_directly(*one) if n % 3 else None for n, one in enumerate(wanted)]
+        found = [run_world(*one) if n % 3 else None for n, one in enumerate(wanted)]
         made.extend(found)
         return found
 
     def run(*wanted):
         here.append(wanted)
-        return run_directly(*wanted)
+        return run_world(*wanted)
 
     plain, quick = (check_claims(run=each, ids=["C14"], ahead=crew)
-                    for each, crew in ((run_directly, None), (run, ahead)))  # fmt: skip
+                    for each, crew in ((run_world, None), (run, ahead)))  # fmt: skip
     assert plain == quick and made and len(here) == made.count(None)
 
 
 def test_regions_that_overlap_share_the_starts_that_confirm_them():
-    tested = Study().starts()
+    tested = start_conditions("quick")
     wide, narrow = (drawn(tested, Region((("tilt", "rad", None, high),)), 1, 40) for high in (0.3, 0.15))
     assert len(wide) == len(narrow) == 40 and all(start.tilt <= 0.15 for start in narrow)
     assert set(narrow) >= {start for start in wide if start.tilt <= 0.15}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verification.claims.claim import Claim
+from verification.check import Check
 from verification.finding import (
     LEAST_CONFIRMING,
     LEAST_DECIDED,
@@ -22,7 +22,6 @@ from verification.finding import (
     verdict_of_trials,
 )
 
-COLUMNS = (Column("part", part=True), Column("tilt", "rad", condition=True), Column("error"))
 GRID = (Column("tilt", "rad", condition=True), Column("width", "m", condition=True))
 
 
@@ -72,16 +71,13 @@ def test_only_an_optional_part_that_is_absent_is_left_out(part, verdict):
     assert verdict_of([Part("", NOT_TESTABLE, optional=True)]) == NOT_TESTABLE
 
 
-def claim(**options):
-    words = dict.fromkeys(("id", "statement", "place", "quantity", "tolerance"), "C99")
-    functions = {"holds": lambda row: row["error"] < 1.0, "finding": lambda table: "Found."}
-    return Claim(**words, **functions, **{"columns": COLUMNS, "cases": None, "trials": None} | options)
+CLAIM = Check(key="C99", question="?", cases=lambda study: (), row=lambda study, case: case, parts=["part"],
+              conditions=["tilt"], holds=lambda row: row["error"] < 1.0, says=lambda table: "Found.")  # fmt: skip
 
 
 def concluded(*trials, times=LEAST_DECIDED):
-    rows = [dict(zip(("part", "tilt", "error"), trial, strict=True)) for trial in trials for _ in range(times)]
-    table = table_of(COLUMNS, rows)
-    return claim().conclude(claim().judge(table))
+    rows = [dict(zip(("part", "tilt [rad]", "error"), trial, strict=True)) for trial in trials for _ in range(times)]
+    return CLAIM.conclude(CLAIM.table_of(rows))
 
 
 def test_a_claim_with_one_refuted_part_among_a_thousand_is_not_reproduced():

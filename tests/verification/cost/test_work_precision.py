@@ -12,7 +12,7 @@ from reports.commands.bench import seconds_of
 from reports.figures.cost import budget_share, impact_accuracy, where_iapb_loses
 from reports.figures.cost import which_method as drawn_choices
 from verification import which_method
-from verification.claims.c22_cost import COLUMNS as C22_COLUMNS
+from verification.claims import CLAIMS
 from verification.cost import calls, impacts
 from verification.cost.calls import DaqpCall, KernelCall, LemkeCall, SweepsCall, engine_call
 from verification.cost.impacts import (
@@ -187,7 +187,7 @@ def test_where_a_rival_is_faster_is_said() -> None:
     assert [row["solver"] for row in lost_to_rivals(KNOWN).records()] == ["Lemke", "Lemke"]
     keys = ("problem", "contacts", "ratio", "lower quartile", "upper quartile")
     rows = [("pile", 1, 2.0, 1.9, 2.1), ("pile", 8, 0.5, 0.4, 0.6), ("pile", 64, 0.99, 0.9, 1.1)]
-    kernels = table_of(C22_COLUMNS, [dict(zip(keys, row, strict=True)) for row in rows])
+    kernels = CLAIMS["C22"].table_of([dict(zip(keys, row, strict=True)) for row in rows])
     said = where_iapb_loses.draw({"work_precision": KNOWN, "C22/C22": kernels}).caption
     assert "On pile IAPB is clearly slower at 1 of 3 sizes, from 8 to 8 contacts: at worst, it takes 2 times" in said
     assert "solver is faster than IAPB, both compiled, with an error of at most 1e-6: 2 of" in said

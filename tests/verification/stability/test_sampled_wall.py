@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError
-from verification.claims import CLAIMS, Study
+from verification.check import Study
+from verification.claims import CLAIMS
 from verification.stability.maps import GROWS, PAPER_DAMPING, StabilityMap, grid, walls
 from verification.stability.sampled_wall import IMPULSES, LAWS, PENALTY, Loop, _held_force, touch_walls
 
@@ -78,7 +79,7 @@ def test_an_unknown_law_is_refused() -> None:
 
 def test_c20_holds_and_would_not_with_the_bound_in_the_wrong_place() -> None:
     claim = CLAIMS["C20"]
-    table = claim.measure(Study())
+    table = claim.table(Study())
     assert table.passed is True
     moved = [dict(row, **{"virtual damping": 2.0 * row["virtual damping"]}) for row in table.records()
              if row["virtual damping"] == 0.95]  # fmt: skip

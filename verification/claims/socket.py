@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from verification.claims.claim import Claim
-from verification.finding import Column, Region, Row, Table
+from verification.check import Check, Study
 from verification.mechanics.false_collisions import EDGE_JUMP, FalseCollisions, count_false, socket
-
-if TYPE_CHECKING:
-    from verification.claims.study import Study
+from verification.region import Region
+from verification.table import Row, Table
 
 REACHES = "coherence that reaches the contact on the next facet (our condition)"
 SHORT = "coherence above speed × step (the paper's condition), short of the next facet"
@@ -23,21 +20,6 @@ COHERENCE = {"quick": (0.0, 1.0, 2.0, 4.0, 6.0, 10.0), "full": (0.0, 1.0, 2.0, 3
 DAMPING = (10.0, 20.0, 40.0, 60.0)  # [N s/m]
 FRESH = 40  # sockets drawn to confirm a region; each part uses those that belong to it
 RATES = {"quick": (1000.0,), "full": (500.0, 1000.0, 2000.0)}  # [Hz]
-
-COLUMNS = (
-    Column("part", part=True),
-    Column("cluster_distance", "mm", condition=True),
-    Column("coherence_distance", "mm", condition=True),
-    Column("damping", "N s/m", condition=True),
-    Column("rate", "Hz", condition=True),
-    Column("speed × step", "mm"),
-    Column("false collisions without filters"),
-    Column("false collisions"),
-    Column("doubled contacts without filters"),
-    Column("doubled contacts"),
-    Column("steps off the facets"),
-    Column("energy lost in them", "of the fall"),
-)
 
 
 class Socket(NamedTuple):
@@ -49,14 +31,14 @@ class Socket(NamedTuple):
     coherence: float
 
 
-def cases(study: Study) -> list[Socket]:
+def _cases(study: Study) -> list[Socket]:
     """Every pair of filter distances with at least one filter, at every damping and rate."""
     depth = study.depth
     every = (Socket(*case) for case in product(RATES[depth], DAMPING, CLUSTER[depth], COHERENCE[depth]))
     return [case for case in every if case.cluster or case.coherence]
 
 
-def draw(study: Study, region: Region) -> list[Socket]:
+def _draw(study: Study, region: Region) -> list[Socket]:
     """Draw fresh sockets, each condition uniformly between the ends of the region."""
     rng, depth = np.random.default_rng(study.seed), study.depth
     ends = (region.ends("rate", RATES[depth]), region.ends("damping", DAMPING),
@@ -64,11 +46,20 @@ def draw(study: Study, region: Region) -> list[Socket]:
     return [Socket(*(float(f"{rng.uniform(*each):.4g}") for each in ends)) for _ in range(FRESH)]
 
 
-def trials(study: Study, case: Socket) -> Iterator[dict[str, Any]]:
-    """Yield the trial that compares the ball with these filters to the ball without filters."""
+def _row(study: Study, case: Socket) -> dict[str, Any]:
+    """Compare the ball with these filters to the ball without filters."""
     plain, filtered = (_found(study, each) for each in (case._replace(cluster=0.0, coherence=0.0), case))
-    yield {"cluster_distance": case.cluster, "coherence_distance": case.coherence, "damping": case.damping,
-           "rate": case.rate} | _row(plain, filtered, case.coherence, case.rate)  # fmt: skip
+    travel = 1e3 * filtered.largest_speed / case.rate
+    part = REACHES if case.coherence > 1e3 * EDGE_JUMP + travel else SHORT
+    return {
+        "part": part if case.coherence else CLUSTERING, "cluster_distance [mm]": case.cluster,
+        "coherence_distance [mm]": case.coherence, "damping [N s/m]": case.damping, "rate [Hz]": case.rate,
+        "speed × step [mm]": travel,
+        "false collisions without filters": plain.collisions, "false collisions": filtered.collisions,
+        "doubled contacts without filters": plain.doubled, "doubled contacts": filtered.doubled,
+        "steps off the facets": filtered.lifted,
+        "energy lost in them [of the fall]": filtered.energy_lost / filtered.potential_drop,
+    }  # fmt: skip
 
 
 def _found(study: Study, case: Socket) -> FalseCollisions:
@@ -81,18 +72,7 @@ def _found(study: Study, case: Socket) -> FalseCollisions:
     return study.once(("socket", case), count)
 
 
-def _row(plain: FalseCollisions, filtered: FalseCollisions, coherence: float, rate: float) -> dict[str, Any]:
-    travel = 1e3 * filtered.largest_speed / rate
-    part = REACHES if coherence > 1e3 * EDGE_JUMP + travel else SHORT
-    return {
-        "part": part if coherence else CLUSTERING, "speed × step": travel,
-        "false collisions without filters": plain.collisions, "false collisions": filtered.collisions,
-        "doubled contacts without filters": plain.doubled, "doubled contacts": filtered.doubled,
-        "steps off the facets": filtered.lifted, "energy lost in them": filtered.energy_lost / filtered.potential_drop,
-    }  # fmt: skip
-
-
-def holds(row: Row) -> bool | None:
+def _holds(row: Row) -> bool | None:
     """Return whether no false collision remains; None if there was none, or if the paper's condition is not met."""
     if row["false collisions without filters"] == 0:
         return None
@@ -101,19 +81,18 @@ def holds(row: Row) -> bool | None:
     return bool(row["false collisions"] == 0)
 
 
-def finding(table: Table) -> str:
-    """Return the result in words, with numbers."""
-    failures = table.where(part=REACHES).that(False)
+def _says(table: Table) -> str:
     clustering = table.where(part=CLUSTERING)
+    collisions, unfiltered, doubled, all_contacts = (
+        _middle(clustering.column(f"{kind}{without}"))
+        for kind in ("false collisions", "doubled contacts") for without in ("", " without filters"))
     return (
         "Temporal coherence removes false collisions only if its distance reaches the contact on the next facet, "
-        f"{1e3 * EDGE_JUMP:.1f} mm away{_bouncing(failures)}. With clustering alone the remaining contact jumps from "
-        "facet to facet and is new each time: the median is "
-        f"{_median(clustering, 'false collisions')} false collisions, against "
-        f"{_median(clustering, 'false collisions without filters')} without any filter. Clustering removes duplicate "
-        f"contacts: the median is {_median(clustering, 'doubled contacts')}, against "
-        f"{_median(clustering, 'doubled contacts without filters')} without it."
-    )
+        f"{1e3 * EDGE_JUMP:.1f} mm away{_bouncing(table.where(part=REACHES).that(False))}. With clustering alone the "
+        f"remaining contact jumps from facet to facet and is new each time: the median is {collisions} false "
+        f"collisions, against {unfiltered} without any filter. Clustering removes duplicate contacts: the median is "
+        f"{doubled}, against {all_contacts} without it."
+    )  # fmt: skip
 
 
 def _bouncing(failures: Table) -> str:
@@ -126,24 +105,17 @@ def _bouncing(failures: Table) -> str:
             "the ball bounces off the facets at the edges, and each return is a new contact")  # fmt: skip
 
 
-def _median(table: Table, name: str) -> str:
-    counts = sorted(table.column(name))
-    return f"{counts[len(counts) // 2]}" if counts else "no"
+def _middle(counts: list[int]) -> str:
+    return f"{sorted(counts)[len(counts) // 2]}" if counts else "no"
 
 
-CLAIM = Claim(
-    id="C18",
-    statement="Clustering and temporal coherence remove false collisions.",
-    place="Section III",
+C18 = Check(
+    key="C18", question="Clustering and temporal coherence remove false collisions.", place="Section III",
     quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. In the round "
     "socket that the facets approximate there are none, so each is false.",
     tolerance="No false collision remains. A trial cannot tell if its coherence distance is not above speed × step, "
     "because the paper requires this.",
-    columns=COLUMNS,
-    cases=cases,
-    trials=trials,
-    holds=holds,
-    finding=finding,
-    draw=draw,
+    cases=_cases, row=_row, holds=_holds, says=_says, draw=_draw, parts=["part"],
+    conditions=["cluster_distance", "coherence_distance", "damping", "rate"],
     axes=("cluster_distance", "coherence_distance", "damping"),
-)
+)  # fmt: skip

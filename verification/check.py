@@ -1,0 +1,231 @@
+"""Check: a question, the cases on which it is tested, and the rule that decides each row. Topic: a list of Checks.
+
+Every study is one or more Checks. Its functions know only their case; the runner in this module knows failures,
+progress, depth and tables. No verdict is written by hand: it follows from the outcomes of the rows.
+
+    Check.finding(study)              a claim: each part is judged, a region is searched where a part is mixed
+    Topic(run, depth, progress)       a section of the report: each check gives a table and its sentences
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeVar, cast
+
+from iapb.run import Run
+from iapb.scene import Scene, find_scene, load_scene
+from reference.worlds import run_world
+from verification.finding import (
+    NOT_COMPUTED,
+    Failure,
+    Finding,
+    Part,
+    attempt,
+    check_depth,
+    finding_of,
+    judge_part,
+    of_each,
+    verdict_of_law,
+)
+from verification.region import Region
+from verification.table import HOLDS, Row, Table, by_part, column_of, ranges
+
+Case = TypeVar("Case")
+Result = TypeVar("Result")
+Said = str | Part | Iterable[Part]
+Wanted = tuple[Scene, str, str]  # scene, world, rendering
+
+SEED = 20050601  # of random impacts and conditions: the month in which the paper appeared
+
+
+@dataclass
+class Study:
+    """What the functions of a check get: runs, the depth, the seed, and results that several checks share.
+
+    run : (scene, world, rendering) -> Run, made now or read from a store
+    depth : "quick" or "full"; "full" has more cases
+    seed : of random impacts and of fresh conditions
+    asked : called whenever a check uses a run, even if an earlier check made that run
+    ahead : (scene, world, rendering) triples -> one Run each, in the same order; for a None, `run` is called later
+    failures : receives the cases that raise an exception; if it is None, the exceptions propagate
+    """
+
+    run: Callable[..., Run] = run_world
+    depth: str = "quick"
+    seed: int = SEED
+    asked: Callable[[Scene, str, str], None] | None = None
+    ahead: Callable[[Sequence[Wanted]], Iterable[Run | None]] | None = None
+    failures: list[Failure] | None = None
+    results: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        check_depth(self.depth)
+
+    def once(self, key: Hashable, compute: Callable[[], Result]) -> Result:
+        """Return the result of `compute`, which is called only once for each key."""
+        if key not in self.results:
+            self.results[key] = compute()
+        return cast(Result, self.results[key])
+
+    def scene(self, name: str) -> Scene:
+        """Return a scene of the project by name."""
+        return self.once(("scene", name), lambda: load_scene(find_scene(name)))
+
+    def each(self, cases: Iterable[Case], results: Callable[[Case], Iterable[Result]]) -> Iterator[Result]:
+        """Yield the results of each case; a case that raises is added to `failures` if that list is given."""
+        return of_each(cases, results, self.failures)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """A question with the cases that answer it.
+
+    Attributes
+    ----------
+    key : name of the check and of its table; question : what is claimed or asked, in one sentence
+    cases : study -> the cases to test
+    row : (study, case) -> the row of a case, or several rows. The keys of a row carry the unit, such as "error [m]";
+        they are the columns of the table, in the order of their first appearance
+    holds : one row -> True, False, or None if the row cannot decide; a pure function of the row, whose keys here lack
+        the unit. Without it a row may have the key "holds"; without either, nothing is judged
+    says : judged table -> the result in words with numbers. A topic may also return one or more Parts; a Part with an
+        empty verdict gets that of the table
+    conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split the rows into parts,
+        that count the cases of a row, that depend on measured times, and that are sentences (see `Column`)
+    draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no fresh cases
+    prepare : (study, cases), called before the first row, for example to make runs on several cores
+    rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure refutes
+    place, quantity, tolerance : where the paper says it, what is measured, and the limit with its reason
+    note : text printed below the table; digits : significant digits in print
+    axes : columns of the plotted maps: horizontal, vertical, and those that split the maps
+    timed_rows : True if the selection of rows depends on measured times
+    """
+
+    key: str
+    question: str
+    cases: Callable[[Study], Iterable[Any]]
+    row: Callable[[Study, Any], Row | Iterable[Row]]
+    holds: Callable[[Row], bool | None] | None = None
+    says: Callable[[Table], Said] | None = None
+    conditions: Collection[str] = ()
+    parts: Collection[str] = ()
+    counts: Collection[str] = ()
+    timed: Collection[str] = ()
+    prose: Collection[str] = ()
+    draw: Callable[[Study, Region], Iterable[Any]] | None = None
+    prepare: Callable[[Study, Sequence[Any]], object] | None = None
+    rule: Callable[[Iterable[bool | None]], str] = verdict_of_law
+    place: str = ""
+    quantity: str = ""
+    tolerance: str = ""
+    note: str = ""
+    digits: int = 4
+    axes: tuple[str, ...] = ()
+    timed_rows: bool = False
+
+    def table(self, study: Study, cases: Iterable[Any] | None = None) -> Table:
+        """Return the judged rows of the given cases; by default of all cases."""
+        chosen = tuple(self.cases(study) if cases is None else cases)
+        if self.prepare is not None:
+            self.prepare(study, chosen)
+
+        def rows(case: Any) -> Iterable[Row]:
+            found = self.row(study, case)
+            return (found,) if isinstance(found, Mapping) else found
+
+        return self.table_of(study.each(chosen, rows))
+
+    def table_of(self, rows: Iterable[Row]) -> Table:
+        """Return the judged table of these rows; a row without a value has None in its place."""
+        given = list(rows)
+        titles = [title for title in dict.fromkeys(title for row in given for title in row) if title != HOLDS]
+        marks = {"condition": self.conditions, "part": self.parts, "cases": self.counts, "timed": self.timed,
+                 "prose": self.prose}  # fmt: skip
+        table = Table(tuple(column_of(title, **marks) for title in titles),
+                      tuple(tuple(row.get(title) for title in titles) for row in given),
+                      digits=self.digits, note=self.note, timed_rows=self.timed_rows)  # fmt: skip
+        if self.holds is not None:
+            return table.judged(self.holds)
+        known = any(HOLDS in row for row in given)
+        return replace(table, holds=tuple(row.get(HOLDS) for row in given)) if known else table
+
+    def finding(self, study: Study) -> Finding:
+        """Measure and judge all rows and return the finding on a claim; fresh cases confirm its regions."""
+        return self.conclude(self.table(study), study)
+
+    def conclude(self, table: Table, study: Study | None = None) -> Finding:
+        """Return the finding on a claim from its judged table; without a study it draws no fresh cases."""
+        parts = [judge_part(name, rows, self._fresh(study, name)) for name, rows in by_part(table).items()]
+        return self._found(str(self.says(table)) if self.says else "", parts, table)
+
+    def not_computed(self) -> Finding:
+        """Return the finding on a claim without any row."""
+        return self._found("", [Part("Not computed.", NOT_COMPUTED)], self.table_of(()))
+
+    def _found(self, answer: str, parts: Iterable[Part], table: Table) -> Finding:
+        details = {"place": self.place, "quantity": self.quantity, "tolerance": self.tolerance}
+        found = finding_of(self.key, self.key, self.question, answer, parts, {self.key: table})
+        return replace(found, details=details | {"conditions": ranges(table)}, axes=self.axes)
+
+    def _fresh(self, study: Study | None, name: str) -> Callable[[Region], Table] | None:
+        """Return the function that draws and judges fresh rows of a part inside a region."""
+        draw = self.draw
+        if study is None or draw is None:
+            return None
+
+        def drawn(region: Region) -> Table:
+            table = self.table(study, draw(study, region))
+            rows = by_part(table).get(name, table.only(()))
+            return rows.only(region.contains(row) for row in rows.records())
+
+        return drawn
+
+    def sentences(self, table: Table) -> tuple[Part, ...]:
+        """Return what a topic says of the judged table; nothing if the table is neither judged nor told."""
+        if self.says is None:
+            if not table.holds:
+                return ()
+            said: Said = f"{self.question} {sum(table.decided)} of {len(table.decided)} rows hold."
+        else:
+            said = self.says(table)
+        if isinstance(said, str):
+            said = Part(said, "", timed=any(column.timed for column in table.columns))
+        given = (said,) if isinstance(said, Part) else tuple(said)
+        return tuple(part if part.verdict else replace(part, verdict=self.rule(table.holds)) for part in given)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Topic:
+    """A section of the report: a question and the checks that answer it.
+
+    key, title, question : as in `Finding`; checks : one table each, in the order of the report
+    says : (tables by key of the check, all parts) -> the answer on the first page; a Part if it quotes quantities
+    """
+
+    key: str
+    title: str
+    question: str
+    checks: tuple[Check, ...]
+    says: Callable[[Mapping[str, Table], Sequence[Part]], str | Part]
+
+    def __call__(self, run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
+        """Run every check and return the finding. A check that raises leaves no table; the finding names it."""
+        study, total = Study(run, depth), len(self.checks)
+        tables: dict[str, Table] = {}
+        parts: list[Part] = []
+        failures: list[Failure] = []
+        for done, check in enumerate(self.checks):
+            progress(done, total)
+            study.failures = []
+            table = attempt("all of it", partial(check.table, study), study.failures)
+            if table is not None:
+                tables[check.key] = table
+                parts += attempt("its sentence", partial(check.sentences, table), study.failures) or ()
+            failures += [replace(one, case=f"{check.key}, {one.case}") for one in study.failures]
+        progress(total, total)
+        said = attempt("the answer", partial(self.says, tables, parts), failures) or ""
+        answer = said if isinstance(said, Part) else Part(said, "")
+        return finding_of(self.key, self.title, self.question, answer.sentence, parts, tables, failures,
+                          answer.quantities)

@@ -1,0 +1,164 @@
+"""Region: the bounds on one or two conditions inside which a claim holds; how it is found and confirmed.
+
+A region is found on one half of the trials. It is confirmed if the claim holds in all trials of the other half that lie
+inside it and in all fresh trials drawn inside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from verification.table import Column, Row, Table
+
+# Least number of trials that confirm a region. If the claim were wrong in a quarter of the region, ten trials in a row
+# would hold with probability 0.05 (0.74¹⁰); if it were wrong in half, with probability 1/1024. A single failure counts.
+LEAST_CONFIRMING = 10
+SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
+_MOST_ENDS = 8  # above the number of ends of two intervals
+_DECADES = 1e3  # a condition with a larger ratio of its ends is measured in decades
+
+
+@dataclass(frozen=True)
+class Region:
+    """Region in which a part holds: bounds on one or two conditions. The claim holds in every trial inside.
+
+    bounds : condition, its unit, lowest and highest value; None if the region extends to the end of the tested range
+    searched : number of trials inside, from the half in which the region was found; others : from the other half
+    fresh : number of trials drawn for the confirmation
+    share : share of the tested range that the region covers, by length or by decades
+    """
+
+    bounds: tuple[tuple[str, str, float | None, float | None], ...]
+    searched: int = 0
+    others: int = 0
+    fresh: int = 0
+    share: float = 0.0
+
+    def contains(self, row: Row) -> bool:
+        """Whether a trial lies inside the region or on its bounds."""
+        return all((low is None or row[key] >= low) and (high is None or row[key] <= high)
+                   for key, _, low, high in self.bounds)  # fmt: skip
+
+    def ends(self, key: str, tested: Sequence[float]) -> tuple[float, float]:
+        """Return the bounds of a condition; the end of the tested range replaces a missing bound."""
+        low, high = next(((low, high) for name, _, low, high in self.bounds if name == key), (None, None))
+        return min(tested) if low is None else low, max(tested) if high is None else high
+
+    def __str__(self) -> str:
+        """The bounds, such as "tilt <= 0.015 rad"."""
+        return " and ".join(_bound(*bound) for bound in self.bounds)
+
+
+def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
+    key = key.replace("_", " ")
+    if low is None:
+        return f"{key} <= {high:g} {unit}".rstrip()
+    return f"{key} >= {low:g} {unit}".rstrip() if high is None else f"{low:g} <= {key} <= {high:g} {unit}".rstrip()
+
+
+def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:
+    """Return the region that the other half and fresh trials confirm, and the result of the search in words.
+
+    If the other half contradicts the region, both halves are searched; then only fresh trials can confirm a region.
+    """
+    first = np.zeros(len(trials.rows), np.bool_)
+    first[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
+    region = search_region(trials.only(first))
+    inside = trials.only(not searched and region is not None and region.contains(row)
+                         for searched, row in zip(first, trials.records(), strict=True))  # fmt: skip
+    if region is None or False in inside.holds:
+        contradicted = f"{region} fails in {_failing(inside)} other trials" if region else ""
+        region, inside = (search_region(trials), trials.only(())) if fresh else (None, inside)
+        if region is None:
+            return None, f"no region confirmed: {contradicted}" if contradicted else "no region found"
+    drawn = fresh(region) if fresh else inside.only(())
+    if False in drawn.holds:
+        return None, f"no region confirmed: {region} fails in {_failing(drawn)} fresh trials"
+    region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
+    counts = (f"{region.searched} trials that found this region, {region.others} others and {region.fresh} fresh ones "
+              "hold")  # fmt: skip
+    if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
+        return None, f"no region confirmed: for {region} only {counts}"
+    return region, f"where {region} ({region.share:.0%} of the tested range) all {counts}"
+
+
+def _failing(trials: Table) -> str:
+    return f"{trials.holds.count(False)} of {len(trials.decided)}"
+
+
+def search_region(trials: Table) -> Region | None:
+    """Return the region, bounded in one or two conditions, with most trials and no failure; None if there is none.
+
+    The search tries every interval between values of a condition, alone and with every interval of every other
+    condition. Among regions with equally many trials it takes the one with the fewest bounds, then the first in the
+    order of the columns. It adds a second condition only if the region then keeps at least 1.5 times as many trials,
+    because the simpler region generalizes better.
+    """
+    scales = [_intervals(column, trials) for column in trials.columns if column.condition]
+    scales = [scale for scale in scales if len(scale) > 1]
+    alone = max((_best(trials, scale, [_Interval()]) for scale in scales), key=_kept_simply, default=(0, ()))
+    pairs = (_best(trials, first, second) for first, second in combinations(scales, 2))
+    together = max(pairs, key=_kept_simply, default=(0, ()))
+    kept, chosen = together if 2 * together[0] >= 3 * alone[0] else alone
+    if not kept or not chosen:
+        return None
+    share = math.prod(interval.share for interval in chosen)
+    return Region(tuple((x.key, x.unit, x.low, x.high) for x in chosen), kept, share=share)
+
+
+@dataclass(frozen=True)
+class _Interval:
+    """Values of one condition between `low` and `high`; None means no bound on that side."""
+
+    key: str = ""
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    share: float = 1.0
+
+    @property
+    def ends(self) -> int:
+        return (self.low is not None) + (self.high is not None)
+
+    def inside(self, trials: Table) -> np.ndarray:
+        values = np.array(trials.column(self.key) if self.key else [0.0] * len(trials.rows), float)
+        low, high = -np.inf if self.low is None else self.low, np.inf if self.high is None else self.high
+        return (values >= low) & (values <= high)
+
+
+def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, tuple[_Interval, ...]]:
+    """Number of trials that the best pair of intervals keeps without a failure, and those of the two with a bound."""
+    held, failed = (np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False))
+    inside, other = (np.array([interval.inside(trials) for interval in scale]) for scale in (first, second))
+    kept, wrong = ((inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed))
+    ends = np.add.outer([interval.ends for interval in first], [interval.ends for interval in second])
+    score = np.where(wrong == 0, _MOST_ENDS * kept - ends, -_MOST_ENDS)
+    i, j = np.unravel_index(int(score.argmax()), score.shape)
+    found = int(kept[i, j]) if wrong[i, j] == 0 else 0
+    return found, tuple(interval for interval in (first[i], second[j]) if interval.ends)
+
+
+def _kept_simply(found: tuple[int, tuple[_Interval, ...]]) -> tuple[int, int]:
+    return found[0], -sum(interval.ends for interval in found[1])
+
+
+def _intervals(column: Column, trials: Table) -> list[_Interval]:
+    """All intervals between two values of a condition, including the unbounded one; empty if a value is no number."""
+    values = trials.column(column.key)
+    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return []
+    seen = sorted(set(values))
+    if len(seen) < 2:
+        return []
+    scale = math.log10 if seen[0] > 0 and seen[-1] / seen[0] >= _DECADES else float
+    length = scale(seen[-1]) - scale(seen[0])
+    return [
+        _Interval(column.key, column.unit, low if i else None, high if j < len(seen) - 1 else None,
+                  (scale(high) - scale(low)) / length)
+        for i, low in enumerate(seen) for j, high in enumerate(seen) if i < j
+    ]  # fmt: skip

@@ -1,0 +1,188 @@
+"""Table: the rows of a study, the description of each column, and whether what is claimed holds in each row."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+Row = Mapping[str, Any]
+
+HOLDS = "holds"  # heading of the outcomes in printed tables
+WORDS = {True: "yes", False: "no", None: "cannot tell"}  # words for the outcomes
+_UNIT = re.compile(r"^(?P<key>.*\S) \[(?P<unit>[^\[\]]+)\]$")
+_LISTED = 8  # if there are more values, only the smallest and largest are printed
+
+
+@dataclass(frozen=True)
+class Column:
+    """One quantity of every row.
+
+    key : name of the column in code; heading : printed name, by default the key; unit : empty if there is none
+    condition : True if the study chooses the value, False if it measures it
+    part : True if the rows with the same value form one part, which is judged separately
+    cases : True if the value counts the cases of a row, such as the impacts of a batch whose worst one is judged
+    timed : True for a measured time or a value computed from one; it may differ in the next run
+    prose : True for sentences; the numbers in them are compared through other tables
+    """
+
+    key: str
+    unit: str = ""
+    heading: str = ""
+    condition: bool = False
+    part: bool = False
+    cases: bool = False
+    timed: bool = False
+    prose: bool = False
+
+    @property
+    def title(self) -> str:
+        """The heading with the unit."""
+        words = self.heading or self.key
+        return f"{words} [{self.unit}]" if self.unit else words
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of numbers, texts or None ("does not apply"), and the description of each column.
+
+    holds : whether the claim holds, one entry per row; None if the row cannot decide; empty if nothing is judged
+    digits : significant digits in print; note : text printed below the table
+    timed_rows : True if the selection of rows depends on measured times
+    """
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Any, ...], ...] = ()
+    holds: tuple[bool | None, ...] = ()
+    digits: int = 4
+    note: str = ""
+    timed_rows: bool = False
+
+    def column(self, key: str) -> list[Any]:
+        """Return the values of one column."""
+        index = self.keys.index(key)
+        return [row[index] for row in self.rows]
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the rows as dictionaries by key."""
+        return [dict(zip(self.keys, row, strict=True)) for row in self.rows]
+
+    def only(self, kept: Iterable[bool]) -> Table:
+        """Return the rows whose entry in `kept` is true, with their outcomes."""
+        chosen = [k for k, keep in enumerate(kept) if keep]
+        holds = tuple(self.holds[k] for k in chosen) if self.holds else ()
+        return replace(self, rows=tuple(self.rows[k] for k in chosen), holds=holds)
+
+    def where(self, **values: Any) -> Table:
+        """Return the rows in which the named columns have these values."""
+        return self.only(all(row[key] == value for key, value in values.items()) for row in self.records())
+
+    def that(self, outcome: bool | None) -> Table:
+        """Return the rows with this outcome."""
+        return self.only(held is outcome for held in self.holds)
+
+    def select(self, keys: Sequence[str]) -> Table:
+        """Return the table with these columns, in this order."""
+        at = [self.keys.index(key) for key in keys]
+        kept = tuple(tuple(row[k] for k in at) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[k] for k in at), rows=kept)
+
+    def without(self, *keys: str) -> Table:
+        """Return the table without these columns."""
+        return self.select([key for key in self.keys if key not in keys])
+
+    def judged(self, holds: Callable[[dict[str, Any]], bool | None]) -> Table:
+        """Return the table with the outcome `holds(row)` of every row."""
+        return replace(self, holds=tuple(holds(row) for row in self.records()))
+
+    @property
+    def decided(self) -> list[bool]:
+        """The outcomes of the rows that have one."""
+        return [outcome for outcome in self.holds if outcome is not None]
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the claim holds in every row with an outcome; None if no row has one."""
+        return all(self.decided) if self.decided else None
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of the columns."""
+        return [column.key for column in self.columns]
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Printed headings; the heading of the outcomes comes last."""
+        return (*(column.title for column in self.columns), *([HOLDS] if self.holds else ()))
+
+    @property
+    def cells(self) -> tuple[tuple[Any, ...], ...]:
+        """Printed rows; if the table has outcomes, each row ends with its outcome in words."""
+        if not self.holds:
+            return self.rows
+        return tuple((*row, WORDS[held]) for row, held in zip(self.rows, self.holds, strict=True))
+
+    @property
+    def timed(self) -> tuple[str, ...]:
+        """Titles of the timed columns; the outcomes are included, since they may depend on any measured value."""
+        found = tuple(column.title for column in self.columns if column.timed)
+        return (*found, HOLDS) if found and self.holds else found
+
+    @property
+    def prose(self) -> tuple[str, ...]:
+        """Titles of the columns of sentences."""
+        return tuple(column.title for column in self.columns if column.prose)
+
+
+def table_of(columns: Sequence[Column], records: Iterable[Row], **options: Any) -> Table:
+    """Return a table of these columns from dictionaries; missing keys become None."""
+    rows = tuple(tuple(record.get(column.key) for column in columns) for record in records)
+    return Table(tuple(columns), rows, **options)
+
+
+def titled(
+    titles: Sequence[str], rows: Iterable[Sequence[Any]] = (), digits: int = 4, note: str = "",
+    timed: Collection[str] = (), timed_rows: bool = False, prose: Collection[str] = (),
+) -> Table:
+    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is key and heading.
+
+    `timed` and `prose` list the titles of the timed columns and of the columns of sentences.
+    """
+    for kind, names in (("timed", timed), ("prose", prose)):
+        if unknown := [name for name in names if name not in titles]:
+            raise ValueError(f"{kind} columns {unknown}: expected some of {tuple(titles)}")
+    columns = tuple(column_of(title, timed=timed, prose=prose) for title in titles)
+    return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, timed_rows)
+
+
+def column_of(title: str, **marks: Collection[str]) -> Column:
+    """Return the column of a title such as "step [ms]". Each mark (`condition`, `part`, `timed` ...) lists the titles
+    or keys of the columns that have it."""
+    match = _UNIT.match(title)
+    key, unit = (match["key"], match["unit"]) if match else (title, "")
+    flags: dict[str, Any] = {mark: title in names or key in names for mark, names in marks.items()}
+    return Column(key, unit, **flags)
+
+
+def by_part(table: Table) -> dict[str, Table]:
+    """Return the rows of each part by the part's name; a table without parts has one part named ""."""
+    marked = [column.key for column in table.columns if column.part]
+    names = [", ".join(row[key] for key in marked) for row in table.records()]
+    return {part: table.only(name == part for name in names) for part in dict.fromkeys(names)} or {"": table}
+
+
+def ranges(table: Table) -> str:
+    """Return the conditions of a table in words: each with its values, or with its range if there are many."""
+    return "; ".join(f"{column.key} {_span(table.column(column.key))} {column.unit}".rstrip()
+                     for column in table.columns if column.condition and table.rows)  # fmt: skip
+
+
+def _span(values: Sequence[Any]) -> str:
+    found = {value for value in values if value is not None}
+    if any(isinstance(value, str) for value in found):
+        return ", ".join(sorted(map(str, found)))
+    ordered = sorted(found)
+    if len(ordered) > _LISTED:
+        return f"{ordered[0]:g} to {ordered[-1]:g}"
+    return ", ".join(f"{value:g}" for value in ordered)
