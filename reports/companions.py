@@ -1,16 +1,14 @@
-"""Write the files beside the report: its numbers, its manifest, uncommitted changes, and machine-readable metadata."""
+"""Write the files beside the report: its numbers, uncommitted changes, and machine-readable metadata."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from reports.crate import write_crate
-from reports.drafts import CODECHECK_NAME, RESCIENCE_NAME, write_codecheck, write_rescience
 from reports.figures.figure import Figure, NotComputed, Recipe
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.builder import FIRST_PAGE
@@ -20,16 +18,13 @@ from reports.provenance import uncommitted_changes
 from reports.report import ARCHIVE_NAME
 from verification.finding import Failure, attempt
 
-MANIFEST_NAME, DIRTY_NAME = "manifest.json", "dirty.diff"
+DIRTY_NAME = "dirty.diff"
 _TEXTS = {
     FIRST_PAGE: "the report's first page",
     **{section.page: f"the report: {section.title}" for section in SECTIONS},
     ARCHIVE_NAME: "all pages of the report",
     NUMBERS_NAME: "every number of the report, for iapb report diff and iapb reproduce --check",
-    MANIFEST_NAME: "every file behind the report: key, content hash, command, size and what was made from it",
     DIRTY_NAME: "how the sources differed from the commit",
-    CODECHECK_NAME: "a draft for a CODECHECK",
-    RESCIENCE_NAME: "a draft of the metadata for ReScience C, with the verdict of each claim",
 }
 
 
@@ -60,27 +55,10 @@ def remembering(
 def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> tuple[Path, ...]:
     """Write all files that accompany the report in `out`, the RO-Crate metadata last; return the files."""
     numbers = write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))
-    listed = _write_manifest(out / MANIFEST_NAME, evidence)
     changed = _write_changes(out / DIRTY_NAME)
-    command = evidence.provenance.get("command", "iapb reproduce")
-    outputs = {name: _TEXTS[name] for name in (FIRST_PAGE, NUMBERS_NAME, MANIFEST_NAME)}
-    tables = {entry.file: f"table of {entry.name}" for entry in evidence.manifest if not entry.used_by}
-    drafts = (write_codecheck(out, outputs | tables, command),
-              write_rescience(out, {claim.key: claim.verdict for claim in evidence.claims}, command))  # fmt: skip
     beside = {name: text for name, text in _TEXTS.items() if (out / name).is_file()}
     crate = write_crate(out, beside, evidence.manifest, evidence.provenance)
-    return tuple(path for path in (numbers, listed, changed, *drafts, crate) if path)
-
-
-def _write_manifest(path: Path, evidence: Evidence) -> Path:
-    files = [asdict(entry) for entry in evidence.manifest]
-    content = {
-        "format": "iapb manifest", "format_version": 1, "provenance": dict(evidence.provenance),
-        "runs": [entry for entry in files if entry["used_by"]],
-        "tables": [entry for entry in files if not entry["used_by"]],
-    }  # fmt: skip
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
-    return path
+    return tuple(path for path in (numbers, changed, crate) if path)
 
 
 def _write_changes(path: Path) -> Path | None:

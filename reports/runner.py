@@ -93,8 +93,6 @@ class Runner:
         with one_thread():  # as run_world does
             streamed = stream(place, simulation, worlds.label_of(world, rendering), scene.steps, resume=resume,
                               progress=self.progress)  # fmt: skip
-        if streamed.entry is not None:
-            self.store.list_run(streamed.entry)
         return place, streamed
 
     @contextmanager

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import asdict, is_dataclass
-from enum import Enum
-from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
+
+from reports.store.keys import plain
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of sentences.")]
 
@@ -35,25 +32,6 @@ def facts_of(json_: bool) -> Iterator[dict[str, Any]]:
 
 
 def print_json(value: Any) -> None:
-    """Print a value as JSON: dataclasses by their fields, arrays as lists, NaN and infinity as null."""
-    print(json.dumps(_plain(value), indent=1, ensure_ascii=False, allow_nan=False))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, bool | int | str) and not isinstance(value, Enum):
-        return value
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, Enum):
-        return _plain(value.value)
-    if isinstance(value, Path):
-        return str(value)
-    if is_dataclass(value) and not isinstance(value, type):
-        return _plain(asdict(value))
-    if hasattr(value, "_asdict"):
-        return _plain(value._asdict())
-    if isinstance(value, Mapping):
-        return {str(name): _plain(each) for name, each in value.items()}
-    return [_plain(each) for each in value]
+    """Print a value as JSON: records by their fields, arrays as lists, NaN and infinity as null."""
+    finite = json.loads(json.dumps(plain(value)), parse_constant=lambda _: None)
+    print(json.dumps(finite, indent=1, ensure_ascii=False))

@@ -18,13 +18,10 @@ from reports.commands.as_json import Json, print_json
 from reports.commands.lines import sentence, table_lines
 from reports.commands.progress import stage_progress
 from reports.commands.run import Values, scene_given
-from reports.evidence.stage import plain_records
 from reports.figures.figure import NotComputed, draw
 from reports.figures.standalone import standalone
 from reports.figures.worlds import worlds as worlds_figure
 from reports.store.keys import plain
-from reports.store.tables import Column, write_tables
-from reports.store.tables import Table as StoredTable
 from verification.complementarity.complementarity import finding_of_study
 from verification.complementarity.findings import problems as problem_parts
 from verification.complementarity.problems import FACTORS, ProblemStudy, own_problems, study_problems
@@ -64,14 +61,14 @@ def compare(
     export: Annotated[Path | None, typer.Option(
         help="Write iapb's own problems to this folder as FCLIB files, and stop.")] = None,
     out: Annotated[Path | None, typer.Option(
-        help="File of the results, .h5 or .json; default: in out/compare. The figure stands beside it.")] = None,
+        help="File of the results, .json; default: in out/compare. The figure stands beside it.")] = None,
     json_: Json = False,
 ) -> None:
     """Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files."""
     if only_problems and not problems:
         raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
-    if out is not None and out.suffix not in (".h5", ".json"):
-        raise ArgumentError("--out", str(out), "a file that ends in .h5 or .json")
+    if out is not None and out.suffix != ".json":
+        raise ArgumentError("--out", str(out), "a file that ends in .json")
     for given, option in ((worlds, "--worlds"), (against, "--against"), (set_, "--set")):
         if given and scene is None:
             raise typer.BadParameter("give a SCENE", param_hint=option)
@@ -89,14 +86,14 @@ def compare(
         if scene is not None:
             found = compare_worlds(scene_given(scene, set_), worlds.split(",") if worlds else None, against,
                                    impacts=impacts, progress=progress)  # fmt: skip
-            lines, place, figure = _scene_lines(found), out or FOLDER / f"{found.details['scene']}.h5", _figure(found)
+            lines, place, figure = _scene_lines(found), out or FOLDER / f"{found.details['scene']}.json", _figure(found)
         elif only_problems:
             found, lines = _problems_alone(problems or (), progress)
-            place = out or FOLDER / "problems.h5"
+            place = out or FOLDER / "problems.json"
         else:
             study = study_all("full" if full else "quick", problems or (), progress=progress)
             found = finding_of_study(study)
-            lines, place = _study_lines(found, study.problems), out or FOLDER / "complementarity.h5"
+            lines, place = _study_lines(found, study.problems), out or FOLDER / "complementarity.json"
     _keep(found, place, figure)
     if json_:
         print_json(plain_finding(found))
@@ -134,14 +131,7 @@ def _problems_alone(folders: Iterable[Path], progress: Any) -> tuple[Finding, li
 def _keep(found: Finding, place: Path, figure: str) -> None:
     """Store the results and, in the same folder, the figure."""
     place.parent.mkdir(parents=True, exist_ok=True)
-    if place.suffix == ".json":
-        place.write_text(json.dumps(plain_finding(found), ensure_ascii=False), encoding="utf-8")
-    else:
-        tables: dict[str, StoredTable] = {}
-        words = json.dumps(plain_records(found, tables), ensure_ascii=False)
-        column = Column("json", (words,), "1", "what was found as JSON, without the rows of its tables")
-        write_tables(place, (*(table for table in tables.values() if table.columns),
-                             StoredTable("finding", (column,), found.answer)))  # fmt: skip
+    place.write_text(json.dumps(plain_finding(found), ensure_ascii=False), encoding="utf-8")
     if figure:
         place.with_suffix(".svg").write_text(figure, encoding="utf-8")
 

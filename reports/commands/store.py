@@ -26,7 +26,6 @@ from reports.store.care import (
     collect_garbage,
     garbage,
     is_run,
-    mark_stores,
     repair_store,
 )
 from reports.store.logs import is_damaged
@@ -40,12 +39,10 @@ class Action(StrEnum):
     repair = "repair"
     gc = "gc"
     again = "again"
-    mark = "mark"
 
 
-_ACTION = ("check: read every file whole. repair: check, set damaged files aside, write the index anew. gc: list what "
-           "nothing needs; remove it with --delete. again: simulate runs again and compare bit for bit. mark: say of "
-           "folders with results of an older version that they are stores.")
+_ACTION = ("check: read every file whole. repair: check, set damaged files aside. gc: list what nothing needs; "
+           "remove it with --delete. again: simulate runs again and compare bit for bit.")
 
 
 def store(
@@ -62,14 +59,14 @@ def store(
         raise ArgumentError("where", str(where), "a folder of results, or a run file")
     if where.resolve() == Path(where.resolve().anchor):
         raise ArgumentError("where", str(where), "a folder of results, not a whole file system")
-    if where.is_file() and action in (Action.repair, Action.gc, Action.mark):
+    if where.is_file() and action in (Action.repair, Action.gc):
         raise ArgumentError("where", str(where), f"a folder of results: {action} is not for one file")
     if delete and action is not Action.gc:
         raise typer.BadParameter("only with the action gc", param_hint="--delete")
     if action is Action.gc:
         _gc(where, delete, json_)
     else:
-        {Action.check: _check, Action.repair: _repair, Action.again: _again, Action.mark: _mark}[action](where, json_)
+        {Action.check: _check, Action.repair: _repair, Action.again: _again}[action](where, json_)
 
 
 def _check(where: Path, json_: bool) -> None:
@@ -95,7 +92,7 @@ def _repair(where: Path, json_: bool) -> None:
     _tell(states)
     for line in recovered:
         print(line)
-    print(f"The index is written anew; {aside} damaged set aside, to be computed again when next asked for.")
+    print(f"{aside} damaged set aside, to be computed again when next asked for.")
 
 
 def _recovered(log: Path) -> Iterator[str]:
@@ -137,16 +134,6 @@ def _gc(where: Path, delete: bool, json_: bool) -> None:
         print(f"{state.path}: {state.state}: {state.why}")
     print(f"{len(found)} files, {size:.1f} MB, {'removed' if delete else 'would be removed by --delete'}; results of "
           "the present code, of your own code and all foreign files are kept.")
-
-
-def _mark(where: Path, json_: bool) -> None:
-    found = mark_stores(where)
-    if json_:
-        print_json({"marked": found})
-        return
-    for folder in found:
-        print(f"{folder}: marked as a store")
-    print(f"{len(found)} folders marked." if found else "No folder with whole results that is not marked yet.")
 
 
 def _again(where: Path, json_: bool) -> None:

@@ -9,8 +9,6 @@ from reports.provenance import package_version
 from verification.proofs import coq_development
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared"  # optional external files
-# The last fuzzing and fault injection (`make fuzz`); absent where only the package is installed.
-LAST_RESULT = Path(__file__).resolve().parents[2] / "tests" / "robustness" / "last_result.json"
 ABSENT = "absent"
 
 # stage -> folders beside the project that it reads where they exist
@@ -35,9 +33,6 @@ PACKAGES: dict[str, tuple[str, ...]] = {
 def depends_of(stage: str) -> dict[str, str]:
     """Return the external dependencies of a stage by name: hashes of folders (or ABSENT) and package versions."""
     folders = {name: folder_hash(BESIDE / name) for name in FOLDERS.get(stage, ())}
-    if stage == "survival":
-        kept = LAST_RESULT.read_bytes() if LAST_RESULT.is_file() else b""
-        folders[LAST_RESULT.name] = hashlib.sha256(kept).hexdigest() if kept else ABSENT
     if stage in ("proofs", "Coq development"):
         folders |= {"Coq": coq_development.version(), "coq": folder_hash(coq_development.FOLDER)}
     return folders | {name: package_version(name) for name in PACKAGES.get(stage, ())}

@@ -9,7 +9,7 @@ from reports.figures import (
     energy_gains,
     engine_errors,
     fig05_couplings,
-    films,
+    film,
     linked_impacts,
     mechanics,
     scenes_ledger,
@@ -22,7 +22,7 @@ from reports.figures.figure import Recipe
 
 RECIPES: tuple[Recipe, ...] = (
     corner.hero,
-    *films.RECIPES[:1],  # the corner: on the first page, beside the hero
+    *film.RECIPES[:1],  # the corner: on the first page, beside the hero
     complementarity.where_to_stop,
     scenes_plane.peg_corner,
     two_link_arm.arm,
@@ -32,7 +32,7 @@ RECIPES: tuple[Recipe, ...] = (
     scenes_space.scenes_space,
     fig05_couplings.couplings,
     two_link_arm.energy_loss,
-    *films.RECIPES[1:],
+    *film.RECIPES[1:],
     *corner.RECIPES,
     energy_gains.energy_gains,
     cost.which_method,

@@ -24,7 +24,7 @@ class Panel:
     alt: str
     label: str = ""
     wide: bool = False  # take the whole width of the page
-    film: str = ""  # JSON that plays in the place of `svg` (reports/figures/film.py)
+    film: bool = False  # played by the browser (reports/figures/film.py)
 
 
 @dataclass(frozen=True)

@@ -1,276 +1,207 @@
-"""A run as a film: the poses and contacts of its bodies at a few hundred moments, small enough for a page.
+"""Films of planar runs: animated SVG that the browser plays; the page's script adds a slider.
 
-Positions and marks are 16-bit integers in base64. A picture has SIZE units, y down. The moments are evenly spaced in
-time; the moments just before and after the first impacts are added. All impulses between two moments are included.
-
-A film shows the rings and balls of the bodies, static walls, and lines between joints. Their coordinates are in the
-right-handed frame of the view: x across the picture, y up, z towards the reader [m]. A planar scene is seen from above.
+Each body is a group whose place and angle follow the poses of a run (`animateTransform`) at a few hundred moments. The
+moments are evenly spaced in time; those around the first impacts are added. Contacts and impulses are marks that are
+visible from one moment to the next. A picture has SIZE units, y down.
 """
 
 from __future__ import annotations
 
-import base64
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from iapb.run import Run
 from reports.figures.canvas import is_turned, widened
-from reports.figures.geometry import (
-    WORLD,
-    Floats,
-    Placement,
-    View,
-    body_outlines,
-    body_placements,
-    cuboid_faces,
-    cuboid_of_inertia,
-    half_plane,
-    is_spatial,
-    outline,
-    placement,
-)
-from reports.figures.scenes_space import Sight, pieces
+from reports.figures.corner import UNLIMITED
+from reports.figures.figure import Drawn, Panel, Recipe, recipe
+from reports.figures.geometry import Floats, body_outlines, half_plane, outline
+from reports.figures.style import BLUE, FORCE, INK, PEG, VARIABLES, WALL
+from verification.finding import titled
 
 SIZE = (400, 300)
-LARGEST = 60_000  # bytes of one film in the page
-_MOMENTS = (300, 220, 160, 120, 80, 50)  # as many as fit
-_IMPACTS = 60  # the moments around this many first impacts are added
-_STRONGEST = 12  # contacts shown at a moment
+_MOMENTS, _IMPACTS, _MARKED = 160, 30, 60  # moments of a film, first impacts that it adds, moments with marks
 _MARGIN = 0.08  # of the picture
-_WHOLE = 32_000  # largest whole number written
-# steps of a mark per unit, per radian and per root of the strongest
-_PLACE_STEPS, _ANGLE_STEPS, _STRENGTH_STEPS = 40, 10_000, 1000
-_REACH = 50.0  # the side of a standing half-plane that is drawn, in sizes of the bodies
+_REACH = 50.0  # the side of a half-plane that is drawn, in sizes of the bodies
+_LASTS, _SLOWER = 5.0, (1, 2, 5, 10, 20, 50)  # seconds that a film takes at least; how much slower it can be
+_BEFORE = 0.03  # a film begins so long before the first contact [s]
+_STRONGEST = 12  # contacts marked at a moment
+MARKS = "Blue dots are contacts; the line at a dot grows with its force; red crosses are impulses."
 
 
 @dataclass(frozen=True)
-class Ring:
-    """A face with corners (n, 3) [m] in the frame of `body` (a number; -1 = world). `flat`: seen from both sides."""
+class Playback:
+    """A film: its title, its runs by the label of their panel, and its caption."""
 
-    body: int
-    corners: Floats
-    flat: bool = False
-
-
-@dataclass(frozen=True)
-class Ball:
-    """A ball or disc about a center (3,) [m]; `spoke`: a line from its center shows how it turns."""
-
-    body: int
-    center: Floats
-    radius: float
-    spoke: bool
+    title: str
+    runs: Mapping[str, str]
+    see: str
+    section: str = "scene-ledger"
 
 
-@dataclass(frozen=True)
-class Link:
-    """A line from a point of one body to a point of another."""
-
-    first: int
-    start: Floats
-    second: int
-    end: Floats
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Everything that is drawn of a scene."""
-
-    seen: View
-    rings: tuple[Ring, ...]
-    balls: tuple[Ball, ...]
-    links: tuple[Link, ...]
-    walls: tuple[Floats, ...]  # rings (n, 2) in the picture
-
-
-def plan(scene: Mapping[str, Any]) -> View:
-    """Return the view of a planar scene, turned in the same way as its drawing in the paper."""
-    sign = -1.0 if is_turned(scene) else 1.0
-    return View(np.array([sign, 0.0, 0.0]), np.array([0.0, sign, 0.0]), np.array([0.0, 0.0, 1.0]))
+FILMS = {
+    "film-corner": Playback(
+        "The corner, played back", UNLIMITED,
+        "The peg of Figure 7 in four worlds, slowed down. In the ideal world impulses stop the peg at the walls. In "
+        "IAPB an impulse stops it at each new contact, and the springs then yield slightly. With penalties alone (PB) "
+        "a corner penetrates the wall.",
+        "hero"),
+    "film-hole": Playback(
+        "The tight hole, played back", {"IAPB": "hole/IAPB"},
+        "The peg is in the hole with little clearance. It touches both sides and the end."),
+    "film-two-link-arm": Playback(
+        "Two-link arm against an obstacle, played back", {"IAPB": "plane/two_link_arm"},
+        "The arm of Figure 2, case A: it turns into the disc at its left and collides once, at the start."),
+    "film-cradle": Playback(
+        "A row of touching balls, played back", {"IAPB": "plane/cradle"},
+        "One ball strikes a row of four with gaps of 1 mm. Each ball passes its momentum on, and the last ball leaves "
+        "alone."),
+    "film-pushing": Playback(
+        "An arm pushes what it holds, played back", {"IAPB": "group/IAPB"},
+        "A linkage and free bodies that touch one another form one contact group and resolve an impact together."),
+}  # fmt: skip
 
 
-def frames(scene: Mapping[str, Any], seen: View, pose: Floats) -> tuple[Placement, ...]:
-    """Return the placements of the bodies at a pose of the run, in the view's frame."""
-    turn = Placement(np.array([seen.across, seen.up, seen.towards]), np.zeros(3))
-    return tuple(turn @ place for place in body_placements(scene, pose).values())
+def recipe_of(key: str) -> Recipe:
+    """Return the recipe of one film."""
+    shown = FILMS[key]
+    made = recipe(key, shown.title, *shown.runs.values(), caption=f"{shown.see} {MARKS}", section=shown.section)
+    return made(partial(_film, key))
 
 
-def parts(scene: Mapping[str, Any], sight: Sight | None) -> Parts:
-    """Return the drawn parts of a scene; a scene in space needs a `sight`, which gives the viewpoint."""
-    number = {body["name"]: k for k, body in enumerate(scene["bodies"])} | {WORLD: -1}
-    seen = sight.seen if sight else plan(scene)
-    shapes = [shape for k, body in enumerate(scene["bodies"]) for shape in _shapes(k, body)]
-    rings = tuple(shape for shape in shapes if isinstance(shape, Ring))
-    balls = tuple(shape for shape in shapes if isinstance(shape, Ball))
-    return Parts(seen, rings, balls, tuple(_links(scene, number)) if sight else (), tuple(_walls(scene, seen, sight)))
+def _film(key: str, *runs: Run) -> Drawn:
+    """Draw the runs of a film side by side, at the same scale and speed."""
+    end = max(float(run.time[-1]) for run in runs)
+    slower = next((each for each in _SLOWER if each * end >= _LASTS), _SLOWER[-1])
+    low, high = _bounds(runs)
+    touching = [run.time[np.flatnonzero(np.diff(run.contacts.offsets))[0]] for run in runs if len(run.contacts.gap)]
+    start = max(min(touching, default=0.0) - _BEFORE, 0.0)
+    head = f'data-duration="{end:g}" data-slower="{slower}" data-start="{start:.4g}"'
+    panels, rows = [], []
+    for label, run in zip(FILMS[key].runs, runs, strict=True):
+        film = Film(run, low, SIZE[0] / float(high[0] - low[0]), end, slower)
+        alt = f"{run.scene_resolved['title']}, in the world {label}: a film of {end:.2f} s, {slower} times slower."
+        svg = (f'<svg viewBox="0 0 {SIZE[0]} {SIZE[1]}" xmlns="http://www.w3.org/2000/svg" {head} '
+               f'style="max-width: 620px">{film.walls()}{"".join(film.bodies())}{"".join(film.marks())}</svg>')
+        panels.append(Panel(svg, alt, label, film=True))
+        rows.append((label, float(run.time[-1]), run.steps, len(run.contacts.gap), len(run.impacts.step)))
+    return Drawn(tuple(panels), titled(("world", "simulated [s]", "steps", "contacts", "impacts"), rows, digits=3))
 
 
-def _shapes(number: int, body: Mapping[str, Any]) -> Iterator[Ring | Ball]:
-    for shape in body["shapes"] or _of_inertia(body):
-        if shape["kind"] in ("circle", "sphere"):
-            center = np.resize(np.append(shape["center"], 0.0), 3)
-            yield Ball(number, center, shape["radius"], spoke=shape["kind"] == "circle")
-        elif "rpy" in shape:
-            own = placement(shape["center"], shape["rpy"])
-            yield from (Ring(number, face) for face in cuboid_faces(own, shape["size"]))
-        else:
-            corners = outline(shape)
-            yield Ring(number, np.column_stack([corners, np.zeros(len(corners))]), flat=True)
-
-
-def _of_inertia(body: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return a homogeneous box with a free body's mass and inertia; it represents a body without a shape."""
-    if body["joint"] != "free_flyer":
-        return ()
-    return ({"kind": "box", "size": cuboid_of_inertia(body), "center": body["center_of_mass"], "rpy": (0, 0, 0)},)
-
-
-def _links(scene: Mapping[str, Any], number: Mapping[str, int]) -> Iterator[Link]:
-    """Yield lines from joint to joint, and from the last joints to the shapes."""
-    for body in scene["bodies"]:
-        if body["parent"] != WORLD:
-            own = number[body["name"]]
-            yield Link(number[body["parent"]], np.zeros(3), own, np.zeros(3))
-            yield from (Link(own, np.zeros(3), own, np.asarray(s["center"], dtype=float)) for s in body["shapes"])
-
-
-def _walls(scene: Mapping[str, Any], seen: View, sight: Sight | None) -> Iterator[Floats]:
-    if sight:
-        yield from (seen.flat(piece.points) for piece in pieces(sight, {**scene, "bodies": ()}, np.zeros((0, 7))))
-        return
-    corners = [corners for _, corners in body_outlines(scene)]
-    reach = _REACH * float(max(np.ptp(np.vstack(corners), axis=0)))
-    for wall in scene["walls"]:
-        ring = half_plane(wall, reach) if wall["kind"] == "half_plane" else outline(wall)
-        yield ring @ np.array([seen.across[:2], seen.up[:2]]).T
-
-
-@dataclass(frozen=True)
-class Film:
-    """The data of the player (`text`, JSON), and the data of the still pictures."""
-
-    run: Run
-    parts: Parts
-    scale: float  # units per metre
-    corner: Floats  # (2,) [m] of the picture's lower left, in the view's frame
-    steps: tuple[int, ...]
-    text: str
-
-    def flat(self, points: Any) -> Floats:
-        """Return the picture coordinates of points (..., 2 or 3) [m] in the view's frame."""
-        x, y = np.moveaxis(np.asarray(points, dtype=float)[..., :2] - self.corner, -1, 0)
-        return np.stack([self.scale * x, SIZE[1] - self.scale * y], axis=-1)
-
-
-def film(run: Run, sight: Sight | None = None, beside: Sequence[Run] = ()) -> Film:
-    """Return a run as a film of at most LARGEST bytes; a run in space needs a `sight`.
-
-    Films that are shown side by side get the same scale: pass the other runs (of the same scene) as `beside`.
-    """
-    drawn = parts(run.scene_resolved, sight if is_spatial(run.scene_resolved) else None)
-    low, high = _bounds((run, *beside), drawn)
-    scale = SIZE[0] / float(high[0] - low[0])
-    for count in _MOMENTS:
-        steps = moments(run, count)
-        made = Film(run, drawn, scale, low, steps, "")
-        text = json.dumps(_plain(made), separators=(",", ":"))
-        if len(text) <= LARGEST:
-            break
-    return Film(run, drawn, scale, low, steps, text)
-
-
-def moments(run: Run, count: int) -> tuple[int, ...]:
-    """Return steps that are evenly spaced in time, and the steps around the first impacts."""
-    even = np.linspace(0, run.steps, min(count, run.steps + 1)).round().astype(int)
-    struck = np.unique(run.impacts.step)[: min(_IMPACTS, count // 4)]
-    return tuple(int(step) for step in np.unique(np.concatenate([even, struck, struck + 1])) if step <= run.steps)
-
-
-def _bounds(runs: Sequence[Run], drawn: Parts) -> tuple[Floats, Floats]:
-    """Return the corners (2,) [m] of a picture that contains all bodies at all times."""
-    points = [corner for run in runs for step in moments(run, _MOMENTS[-1]) for corner in _corners(run, drawn, step)]
-    low, high = np.min(points, axis=0), np.max(points, axis=0)
+def _bounds(runs: Sequence[Run]) -> tuple[Floats, Floats]:
+    """Return the corners [m] of a picture that contains all bodies at all times, turned as the scene's drawing is."""
+    points = [corners for run in runs for step in moments(run, _MARKED)
+              for _, corners in body_outlines(run.scene_resolved, run.pose[step])]
+    every = _sign(runs[0]) * np.vstack(points)
+    low, high = every.min(axis=0), every.max(axis=0)
     margin = _MARGIN * max(high - low)
     return widened(low - margin, high + margin, SIZE[0] / SIZE[1])
 
 
-def _corners(run: Run, drawn: Parts, step: int) -> list[Floats]:
-    places = frames(run.scene_resolved, drawn.seen, run.pose[step])
-    corners = [point for ring in drawn.rings for point in places[ring.body].of(ring.corners)[:, :2]]
-    for ball in drawn.balls:
-        center = places[ball.body].of(ball.center)[:2]
-        corners += [center - ball.radius, center + ball.radius]
-    return corners + [places[link.second].of(link.end)[:2] for link in drawn.links]
+def _sign(run: Run) -> float:
+    return -1.0 if is_turned(run.scene_resolved) else 1.0
 
 
-def _plain(made: Film) -> dict[str, Any]:
-    """Return the film as plain values; lengths are in units of the picture."""
-    run, scale = made.run, made.scale
-    turns, origins = _poses(made)
-    factor = _WHOLE / max(float(np.abs(origins).max()), float(max(SIZE)))
-    poses = np.concatenate([origins * factor, turns * _WHOLE], axis=-1)
-
-    def lengths(values: Any) -> list[float]:
-        return [round(scale * float(value), 2) for value in np.ravel(values)]
-
-    return {
-        "times": [round(float(run.time[step]), 5) for step in made.steps],
-        "bodies": len(run.scene_resolved["bodies"]), "factor": factor, "poses": _encoded(poses),
-        "rings": [[ring.body, int(ring.flat), *lengths(ring.corners)] for ring in made.parts.rings],
-        "balls": [[ball.body, int(ball.spoke), *lengths([*ball.center, ball.radius])] for ball in made.parts.balls],
-        "links": [[link.first, link.second, *lengths([*link.start, *link.end])] for link in made.parts.links],
-        "marks": _encoded(_marks(made)),
-    }  # fmt: skip
+def moments(run: Run, count: int) -> Floats:
+    """Return steps that are evenly spaced in time, and the steps around the first impacts."""
+    even = np.linspace(0, run.steps, min(count, run.steps + 1)).round().astype(int)
+    struck = np.unique(run.impacts.step)[:_IMPACTS]
+    found = np.unique(np.concatenate([even, struck, struck + 1]))
+    return found[found <= run.steps]
 
 
-def _poses(made: Film) -> tuple[Floats, Floats]:
-    """Return quaternions (moments, bodies, 4) and origins (moments, bodies, 3).
+@dataclass(frozen=True)
+class Film:
+    """The SVG of one run: `corner` (2,) [m] is the picture's lower left, `scale` is in units per metre."""
 
-    Origins are in picture units from the lower left corner, y up.
-    """
-    from scipy.spatial.transform import Rotation
+    run: Run
+    corner: Floats
+    scale: float
+    end: float
+    slower: int
 
-    corner = np.append(made.corner, 0.0)
-    each = [frames(made.run.scene_resolved, made.parts.seen, made.run.pose[step]) for step in made.steps]
-    origins = np.array([[made.scale * (place.origin - corner) for place in places] for places in each])
-    turns = np.array([Rotation.from_matrix([place.rotation for place in places]).as_quat() for places in each])
-    for k in range(1, len(turns)):  # the nearer sign of ±q, so that the player can interpolate linearly
-        turns[k] *= np.where(np.sum(turns[k] * turns[k - 1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-    return turns, origins
+    def flat(self, points: Any) -> Floats:
+        """Return the picture coordinates of points (..., 2) [m]."""
+        x, y = np.moveaxis(_sign(self.run) * np.asarray(points, dtype=float)[..., :2] - self.corner, -1, 0)
+        return np.stack([self.scale * x, SIZE[1] - self.scale * y], axis=-1)
+
+    def walls(self) -> str:
+        """Return the static world."""
+        scene = self.run.scene_resolved
+        reach = _REACH * float(max(np.ptp(np.vstack([corners for _, corners in body_outlines(scene)]), axis=0)))
+        rings = [half_plane(wall, reach) if wall["kind"] == "half_plane" else outline(wall) for wall in scene["walls"]]
+        return f'<path {_paint("fill", WALL)} d="{"".join(_ring(self.flat(ring)) for ring in rings)}"/>'
+
+    def bodies(self) -> Iterator[str]:
+        """Yield the bodies; a circle has a spoke that shows how it turns."""
+        steps = moments(self.run, _MOMENTS)
+        times = self._times(steps)
+        own = self.scale * _sign(self.run) * np.array([1.0, -1.0])
+        look = f'{_paint("fill", PEG)} {_paint("stroke", INK)} stroke-width="1.6" fill-opacity="0.8"'
+        for k, body in enumerate(self.run.scene_resolved["bodies"]):
+            rings = [own * outline(shape) for shape in body["shapes"]]
+            spokes = [own * np.array([ring_center(shape), ring_center(shape) + [shape["radius"], 0.0]])
+                      for shape in body["shapes"] if shape["kind"] == "circle"]
+            places = ";".join(f"{x:.1f} {y:.1f}" for x, y in self.flat(self.run.pose[steps, k, :2]))
+            turns = ";".join(f"{angle:.1f}" for angle in -np.degrees(self.run.pose[steps, k, 2]))
+            drawn = "".join(map(_ring, rings)) + "".join(map(_ring, spokes))
+            yield (f'<g>{self._moved("translate", places, times)}<g><path {look} d="{drawn}"/>'
+                   f"{self._moved('rotate', turns, times)}</g></g>")
+
+    def _times(self, steps: Floats) -> str:
+        """Return the moments as shares of the film; a run that ended early stays as it is."""
+        shares = self.run.time[steps] / self.end
+        shares[-1] = 1.0
+        return ";".join(f"{share:.4f}".rstrip("0").rstrip(".") for share in shares)
+
+    def _moved(self, kind: str, values: str, times: str) -> str:
+        return (f'<animateTransform attributeName="transform" type="{kind}" values="{values}" keyTimes="{times}" '
+                f'dur="{self.slower * self.end:g}s" repeatCount="indefinite"/>')
+
+    def marks(self) -> Iterator[str]:
+        """Yield the contacts at a moment and the impulses since the one before."""
+        contacts, steps = self.run.contacts, moments(self.run, _MARKED)
+        for k, step in enumerate(steps[:-1]):
+            now = slice(int(contacts.offsets[step]), int(contacts.offsets[step + 1]))
+            since = slice(int(contacts.offsets[steps[k - 1]] if k else 0), now.stop)
+            span = self.run.time[step] / self.end, self.run.time[steps[k + 1]] / self.end
+            for strengths, part, color in ((contacts.normal_force, now, BLUE), (contacts.impulse, since, FORCE)):
+                if drawn := "".join(self._mark(strengths, part, cross=color == FORCE)):
+                    yield (f'<path fill="none" {_paint("stroke", color)} stroke-width="2" d="{drawn}">'
+                           f'<animate attributeName="display" values="none;inline;none" calcMode="discrete" '
+                           f'keyTimes="0;{max(span[0], 1e-4):.4f};{span[1]:.4f}" dur="{self.slower * self.end:g}s" '
+                           'repeatCount="indefinite"/></path>')
+
+    def _mark(self, strengths: Floats, part: slice, *, cross: bool) -> Iterator[str]:
+        """Yield a dot and a line for each of the strongest contacts, or a cross; its size is a root of the strength."""
+        largest = float(strengths.max(initial=0.0))
+        chosen = np.arange(part.start, part.stop)[strengths[part] > 0.0]
+        for row in chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]:
+            (x, y), size = self.flat(self.run.contacts.point[row]), float(np.sqrt(strengths[row] / largest))
+            if not (0.0 <= x <= SIZE[0] and 0.0 <= y <= SIZE[1]):
+                continue
+            if cross:
+                arm = 6 + 8 * size
+                yield f"M{x - arm:.1f} {y:.1f}h{2 * arm:.1f}M{x:.1f} {y - arm:.1f}v{2 * arm:.1f}"
+            else:
+                nx, ny = (6 + 26 * size) * _sign(self.run) * self.run.contacts.normal[row][:2]
+                yield f"M{x - 3:.1f} {y:.1f}a3 3 0 1 0 6 0a3 3 0 1 0 -6 0M{x:.1f} {y:.1f}l{nx:.1f} {-ny:.1f}"
 
 
-def _marks(made: Film) -> Floats:
-    """Return rows (moment, x, y, angle, strength): contacts at a moment, and impulses (strength < 0) since the one
-    before."""
-    contacts, offsets = made.run.contacts, made.run.contacts.offsets
-    rows: list[list[float]] = []
-    for k, step in enumerate(made.steps):
-        now = slice(int(offsets[min(step, made.run.steps - 1)]), int(offsets[min(step, made.run.steps - 1) + 1]))
-        since = slice(int(offsets[made.steps[k - 1]] if k else 0), int(offsets[step]))
-        rows += _rows(made, k, now, contacts.normal_force, 1.0) + _rows(made, k, since, contacts.impulse, -1.0)
-    return np.array(rows).reshape(-1, 5)
+def ring_center(shape: Mapping[str, Any]) -> Floats:
+    """Return the center (2,) [m] of a shape in the frame of its body."""
+    return np.asarray(shape["center"], dtype=float)[:2]
 
 
-def _rows(made: Film, moment: int, part: slice, strengths: Floats, sign: float) -> list[list[float]]:
-    """Return rows for the strongest of some contacts; strength is the square root of the share of the run's largest."""
-    contacts, seen = made.run.contacts, made.parts.seen
-    largest = float(strengths.max(initial=0.0))
-    chosen = np.arange(part.start, part.stop)[strengths[part] > 0.0]
-    chosen = chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]
-    points = made.flat(seen.flat(contacts.point[chosen]))
-    normals = seen.flat(contacts.normal[chosen])
-    angles = _ANGLE_STEPS * np.arctan2(-normals[:, 1], normals[:, 0])
-    sizes = np.ceil(_STRENGTH_STEPS * np.sqrt(strengths[chosen] / largest)) if largest else strengths[chosen]
-    limit = 2.0 * max(SIZE)  # what is farther out is not seen
-    shown = np.all(np.abs(points) < limit, axis=1)
-    columns = np.column_stack([np.full(len(chosen), moment), _PLACE_STEPS * points, angles, sign * sizes])
-    return [list(row) for row in columns[shown]]
+def _paint(what: str, color: str) -> str:
+    return f'{what}="var(--{VARIABLES[color]}, {color})"'
 
 
-def _encoded(values: Floats) -> str:
-    """Return 16-bit little-endian integers in base64."""
-    return base64.b64encode(np.rint(values).astype("<i2").tobytes()).decode()
+def _ring(points: Floats) -> str:
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + "z"
+
+
+RECIPES = tuple(recipe_of(key) for key in FILMS)

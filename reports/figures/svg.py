@@ -18,11 +18,11 @@ from reports.figures.style import VARIABLES
 
 LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
 TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
-TIME, PATH = "time", "path"  # a curve over time may be zoomed along t alone; a path in the plane both ways
+TIME, PATH = "time", "path"  # the cursor reads curves over time
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _TAG = re.compile(r"<[^>]+>")  # coordinates are inside of tags; the numbers between them are for people
 _IDENTIFIER = re.compile(r'\sid="([^"]+)"')
-_TOLD = re.compile(r'\sid="(curve|name|axis|label)=([^"]*)"')  # what a gid tells the page's script, see `traced_svg`
+_TOLD = re.compile(r'\sid="(curve|name)=([^"]*)"')  # what a gid tells the page's script, see `traced_svg`
 _TURNED_BY_NOTHING = re.compile(r'\stransform="rotate\(-?0 [^)]*\)"')
 _COMMAND = re.compile(r"\s*([MLCQz])\s*")  # of a path's data; the letters part the numbers by themselves
 _PATH = re.compile(r'\sd="[^"]*"')
@@ -103,10 +103,6 @@ def traced_svg(drawing: Any, key: str, kind: str = TIME) -> str:
     import matplotlib
 
     (axes,) = drawing.axes
-    for name in "xy":
-        axis = getattr(axes, f"{name}axis")
-        axis.set_gid(f"axis={name}")
-        axis.label.set_gid(f"label={name}")
     with matplotlib.rc_context({"path.simplify_threshold": TOLERANCE}):
         for line in axes.lines:
             line.get_path().simplify_threshold = TOLERANCE

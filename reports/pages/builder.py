@@ -184,7 +184,7 @@ def _environment() -> Environment:
         trim_blocks=True, lstrip_blocks=True,
     )
     environment.filters.update(
-        cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled, film=_film,
+        cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
         as_finding=FINDINGS.__getitem__, badge_words=badge_words, counted=counted, tables_without=tables_without,
         runs_by_user=runs_by_user, anchor=anchor, marks=marks, judged=judged,
@@ -199,8 +199,3 @@ def _labelled(panel: Any) -> Markup:
     """Return a panel's SVG as an image with its description."""
     label = Markup.escape(panel.alt)
     return Markup(panel.svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))
-
-
-def _film(panel: Any) -> Markup:
-    """Return a panel's film as text that cannot close the script element that contains it."""
-    return Markup(panel.film.replace("<", "\\u003c"))

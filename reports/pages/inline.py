@@ -1,7 +1,6 @@
 """The page's script, and its Content-Security-Policy: the browser runs only this script and makes no requests.
 
-Each file of `scripts/` is written into the page, in the order below. Without the script the page is complete, but its
-drawings are static.
+Without the script the page is complete: its curves cannot be read with a cursor, and its films play by themselves.
 """
 
 from __future__ import annotations
@@ -12,14 +11,11 @@ from importlib.resources import files
 
 from markupsafe import Markup
 
-SCRIPTS = ("plot.js", "traces.js", "player.js", "printing.js")
-
 
 def script() -> Markup:
-    """Return the text of the page's script; its files share one scope, which is hidden from other code."""
-    folder = files("reports.pages").joinpath("scripts")
-    parts = [folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS]
-    return Markup("(() => {\n\"use strict\";\n" + "\n".join(parts) + "})();\n")
+    """Return the text of the page's script, in a scope of its own."""
+    text = files("reports.pages").joinpath("scripts/page.js").read_text(encoding="utf-8")
+    return Markup("(() => {\n\"use strict\";\n" + text + "})();\n")
 
 
 def policy(text: str) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iapb.errors import ArgumentError, RunFileError
-from reports.store.folder import INDEX_NAME, PARTIAL_SUFFIX, read_index
+from reports.store.folder import PARTIAL_SUFFIX
 from reports.store.io import (
     MARK_NAME,
     WRITING,
@@ -23,7 +23,6 @@ from reports.store.io import (
     is_old,
     is_ours,
     is_store,
-    mark_store,
     opened,
     remove_unless_locked,
 )
@@ -117,19 +116,8 @@ def stores_below(folder: Path | str) -> tuple[Path, ...]:
     """
     found = tuple(mark.parent for mark in sorted(Path(folder).rglob(MARK_NAME)) if is_store(mark.parent))
     if not found:
-        expected = f"a store of iapb ({MARK_NAME}) or a folder of stores; iapb store mark marks those of older versions"
-        raise ArgumentError("where", str(folder), expected)
+        raise ArgumentError("where", str(folder), f"a store of iapb ({MARK_NAME}) or a folder of stores")
     return found
-
-
-def mark_stores(folder: Path | str) -> tuple[Path, ...]:
-    """Mark every folder at or below `folder` that has a complete run or table of iapb; return the newly marked ones."""
-    new: list[Path] = []
-    for path in _files(Path(folder)):
-        if not (path.is_symlink() or is_store(path.parent)) and _is_whole(path):
-            mark_store(path.parent)
-            new.append(path.parent)
-    return tuple(new)
 
 
 def _is_whole(path: Path) -> bool:
@@ -137,7 +125,7 @@ def _is_whole(path: Path) -> bool:
 
 
 def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Rename damaged files and rebuild the index, in all stores; return the earlier state of every file.
+    """Rename damaged files in all stores; return the earlier state of every file.
 
     A renamed file is computed again when it is next requested.
     """
@@ -146,10 +134,6 @@ def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[
     for state in states:
         if state.state == DAMAGED and state.path.parent in stores and not state.path.is_symlink():
             os.replace(state.path, state.path.with_name(state.path.name + DAMAGED_SUFFIX))
-    for store in stores:
-        if (store / INDEX_NAME).is_file():
-            (store / INDEX_NAME).unlink()  # otherwise stale lines about changed files would be used
-            read_index(store)
     return states
 
 

@@ -13,12 +13,10 @@ Each checkpoint is a complete file, because a growing file that is only flushed 
 
 from __future__ import annotations
 
-import json
 import re
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +24,14 @@ from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.store.io import (
     abandoned,
-    append_line,
     mark_store,
-    read_lines,
     remove_unless_locked,
-    written_aside,
 )
 from reports.store.keys import code_label, run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
+from verification.finding import of_each
 
 PARTIAL_SUFFIX = ".partial"
-INDEX_NAME = "index.jsonl"
 _KEY_DIGITS = 16  # 64 bits: a collision among a million runs has a probability below 1e-7; the file has all 256 bits
 # The pause between two checkpoints is at least this long, and at least this many times the last writing time.
 _SHORTEST_PAUSE_SECONDS = 5.0
@@ -168,7 +163,7 @@ class RunStore:
         return self.fetch(self.place_of(inputs, label), compute)[0]
 
     def fetch(self, place: Place, compute: Callable[[Checkpoint], Run]) -> tuple[Run, RunEntry]:
-        """Return the run of a place and the index entry of its file; see `get_or_run`."""
+        """Return the run of a place and the entry of its file; see `get_or_run`."""
         stored = self._read(place)
         if stored is not None:
             return stored
@@ -192,16 +187,11 @@ class RunStore:
     def _keep(self, place: Place, run: Run) -> RunEntry:
         entry = store_run(place.path, run, key=place.key, code=code_label(self.code))
         place.partial.unlink(missing_ok=True)
-        self.list_run(entry)
         return entry
 
-    def list_run(self, entry: RunEntry) -> None:
-        """Add a finished run to the index."""
-        append_line(self.folder / INDEX_NAME, asdict(entry))
-
     def entries(self) -> tuple[RunEntry, ...]:
-        """Return the index: one entry per finished run in the folder, by file name."""
-        return read_index(self.folder)
+        """Return one entry per finished run in the folder, by file name; other and damaged files are left out."""
+        return tuple(of_each(sorted(self.folder.glob("*.h5")), lambda path: [read_entry(path)], []))
 
     def partial_runs(self) -> tuple[Path, ...]:
         """Return the files of unfinished runs."""
@@ -211,28 +201,3 @@ class RunStore:
 def file_name(label: str, key: str) -> str:
     """Return the name of a run's file: a label for readers, and the start of the run key."""
     return (re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run") + f"-{key[:_KEY_DIGITS]}.h5"
-
-
-def read_index(folder: Path) -> tuple[RunEntry, ...]:
-    """Return the entries of all run files in `folder`, by file name; correct the index if it differs from the files."""
-    listed = {}
-    for record in read_lines(folder / INDEX_NAME):
-        with suppress(TypeError):  # no entry
-            listed[record["file"]] = RunEntry(**record)
-    files = sorted(folder.glob("*.h5"))
-    entries = []
-    for path in files:
-        if path.name in listed:
-            entries.append(listed[path.name])
-        else:
-            with suppress(RunFileError):  # a table, or damaged: not a run
-                entries.append(read_entry(path))
-    if {entry.file for entry in entries} != set(listed):
-        _write_index(folder, entries)
-    return tuple(entries)
-
-
-def _write_index(folder: Path, entries: list[RunEntry]) -> None:
-    text = "".join(json.dumps(asdict(entry), ensure_ascii=False) + "\n" for entry in entries)
-    with written_aside(folder / INDEX_NAME, replace=True) as aside:
-        aside.write_text(text, encoding="utf-8")

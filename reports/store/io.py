@@ -32,7 +32,7 @@ _STORE: dict[str, Any] = {
     "note": "iapb store gc and repair act on the sealed files of iapb in this folder, and on nothing else",
 }  # fmt: skip
 WRITING = ".writing"  # suffix of a file that is not yet complete
-_ASIDE = re.compile(rf"\.(.+\.h5(\.partial)?|index\.jsonl|{re.escape(MARK_NAME)})\.\d+{re.escape(WRITING)}")
+_ASIDE = re.compile(rf"\.(.+\.h5(\.partial)?|{re.escape(MARK_NAME)})\.\d+{re.escape(WRITING)}")
 # A write takes seconds; older temporary files were left by killed writers.
 _ABANDONED_AFTER_SECONDS = 3600.0
 
@@ -180,7 +180,7 @@ def is_plain(path: Path) -> bool:
 
 
 def _is_draft(path: Path) -> bool:
-    """Return whether a temporary file is empty or begins like a run, table, index or mark of iapb."""
+    """Return whether a temporary file is empty or begins like a run, table or mark of iapb."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
     ours = _MARK_HEAD in head if path.name.startswith(f".{MARK_NAME}") else head.startswith(b"{")
@@ -419,15 +419,6 @@ def write_quantity(
     for axis, dimension in enumerate(dimensions):
         dataset.dims[axis].attach_scale(group[dimension])
     return dataset
-
-
-def mark_plottable(group: Any, signal: str, axes: Sequence[str]) -> None:
-    """Make `group` an NXdata group, which tells a viewer what to plot; ``"."`` is an axis without values."""
-    import h5py
-
-    group.attrs["NX_class"] = "NXdata"
-    group.attrs["signal"] = signal
-    group.attrs.create("axes", list(axes), dtype=h5py.string_dtype("utf-8"))
 
 
 def read_values(group: Any, name: str, path: str) -> Any:

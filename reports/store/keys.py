@@ -8,6 +8,8 @@ import json
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from enum import Enum
 from functools import cache
 from importlib.metadata import version
 from importlib.util import cache_from_source
@@ -31,16 +33,22 @@ _NUMERIC_PACKAGES = ("numpy", "numba", "scipy")
 
 
 def plain(value: Any) -> Any:
-    """Return `value` in the types of JSON: arrays and tuples become lists, numpy scalars become numbers."""
+    """Return `value` in the types of JSON: records become mappings, arrays and tuples lists, numpy scalars numbers."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
+    if isinstance(value, Enum | Path):
+        return plain(value.value) if isinstance(value, Enum) else str(value)
     if value is None or isinstance(value, bool | int | float | str):
         return value
-    raise ArgumentError("inputs", value, "mappings, sequences, arrays, numbers, texts and None only")
+    raise ArgumentError("value", value, "records, mappings, sequences, arrays, numbers, texts and None only")
 
 
 def canonical_json(value: Any) -> str:
@@ -159,7 +167,7 @@ def results_of(run: Run) -> Iterator[tuple[str, Any]]:
     """Yield name and array of every result that the content hash covers."""
     yield "time", run.time
     for group in RESULT_GROUPS:
-        quantities, record_of, _ = GROUPS[group]
+        quantities, record_of = GROUPS[group]
         for quantity in quantities:
             yield f"{group}/{quantity.name}", getattr(record_of(run), quantity.name)
     for name in sorted(run.energy):

@@ -18,7 +18,6 @@ from reports.provenance import collect_provenance
 from reports.store.io import (
     dataset_of,
     extend,
-    mark_plottable,
     new_file,
     new_large_file,
     opened,
@@ -138,7 +137,7 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
 
 def _append(file: Any, part: Run) -> None:
     """Append a part; its first state equals the last one in the file."""
-    for name, (quantities, record_of, _) in GROUPS.items():
+    for name, (quantities, record_of) in GROUPS.items():
         group = file[name]
         for quantity in quantities:
             values = getattr(record_of(part), quantity.name)
@@ -165,8 +164,6 @@ def _json(value: Any) -> str:
 
 
 def _write_head(file: Any, run: Run, key: str, code: str) -> None:
-    file.attrs["NX_class"] = "NXroot"
-    file.attrs["default"] = "trajectory"
     file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
     file.attrs["title"] = f"{run.scene_name} · {run.world}"
@@ -191,7 +188,7 @@ def _write_names(file: Any, run: Run) -> None:
 
 
 def _write_group(group: Any, name: str, run: Run, growing: bool = False) -> None:
-    quantities, record_of, signal = GROUPS[name]
+    quantities, record_of = GROUPS[name]
     record = record_of(run)
     for quantity in quantities:
         values = getattr(record, quantity.name)
@@ -203,8 +200,6 @@ def _write_group(group: Any, name: str, run: Run, growing: bool = False) -> None
         )
         if quantity.name == "state":
             dataset.attrs.update(STATE_ATTRIBUTES)
-        if quantity.name == signal:
-            mark_plottable(group, signal, [quantity.dimensions[0], *["."] * (len(quantity.dimensions) - 1)])
 
 
 def _write_energy(group: Any, run: Run, growing: bool = False) -> None:
@@ -213,9 +208,6 @@ def _write_energy(group: Any, run: Run, growing: bool = False) -> None:
         if dimension not in group:
             write_scale(group, dimension, *coordinates_of(run, dimension, len(values)), growing=growing)
         write_quantity(group, name, values, (dimension,), "J", name.replace("_", " "), growing=growing)
-    if run.energy:
-        first = next(iter(run.energy))
-        mark_plottable(group, first, [energy_dimension(run, first)])
 
 
 def _write_effects(group: Any, run: Run) -> None:
@@ -344,7 +336,7 @@ def _arrays(file: Any, path: Path | str, read: Callable[[Any, str, str], Any]) -
     place = str(path)
     group = {
         name: {quantity.name: _numbers(read, file[name], quantity.name, place) for quantity in quantities}
-        for name, (quantities, _, _) in GROUPS.items()
+        for name, (quantities, _) in GROUPS.items()
     }
     for name, quantity in (("contacts", "is_new"), ("impacts", "solved")):  # truth values are stored as numbers
         group[name][quantity] = _Truths(group[name][quantity])

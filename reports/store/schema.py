@@ -27,13 +27,13 @@ FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"
 FORMAT_VERSION = 4  # 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M
 
-# group -> its quantities, the record that holds them, and the quantity that a plotting tool shows first
-GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any], str]] = {
-    "trajectory": (quantities(Run, "time"), lambda run: run, "v"),
-    "steps": (quantities(Run, "step"), lambda run: run, "environment_force"),
-    "contacts": (quantities(ContactTable), lambda run: run.contacts, "gap"),
-    "impacts": (quantities(ImpactTable), lambda run: run.impacts, "energy_lost"),
-    "timings": (quantities(Run, "chunk"), lambda run: run, "chunk_seconds"),
+# group -> its quantities, and the record that holds them
+GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any]]] = {
+    "trajectory": (quantities(Run, "time"), lambda run: run),
+    "steps": (quantities(Run, "step"), lambda run: run),
+    "contacts": (quantities(ContactTable), lambda run: run.contacts),
+    "impacts": (quantities(ImpactTable), lambda run: run.impacts),
+    "timings": (quantities(Run, "chunk"), lambda run: run),
 }
 RESULT_GROUPS = ("trajectory", "steps", "contacts", "impacts")  # with the energy balance: the content hash
 

@@ -12,7 +12,7 @@ import hashlib
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,6 @@ from iapb.names import one_of
 from reports.provenance import collect_provenance
 from reports.store.io import (
     extend,
-    mark_plottable,
     new_file,
     new_large_file,
     opened,
@@ -32,9 +31,8 @@ from reports.store.io import (
     write_scale,
     write_text,
 )
-from reports.store.keys import add_array, plain
+from reports.store.keys import add_array
 from reports.store.schema import FORMAT_VERSION, TABLE_FORMAT
-from verification import finding
 
 ROW = "row"
 
@@ -127,7 +125,7 @@ def growing_table(path: Path, others: Sequence[Table]) -> Iterator[Callable[[Tab
 
 def _write_head(file: Any, tables: Sequence[Table], provenance: Mapping[str, str] | None) -> None:
     file.attrs.update(
-        {"NX_class": "NXroot", "default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION}
+        {"default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION}
     )
     for name, text in (collect_provenance() if provenance is None else provenance).items():
         write_text(file.require_group("provenance"), name, text)
@@ -210,7 +208,6 @@ def _write(group: Any, table: Table, *, growing: bool = False) -> None:
     group.attrs["title"] = table.title
     group.attrs["command"] = table.command
     group.attrs["runs"] = "\n".join(table.runs)
-    mark_plottable(group, table.columns[min(1, len(table.columns) - 1)].name, [dimension])
 
 
 def _read(group: Any, path: str) -> Table:
@@ -230,69 +227,6 @@ def _read(group: Any, path: str) -> Table:
     return Table(group.name.strip("/"), columns, str(group.attrs["title"]), runs, str(group.attrs["command"]))
 
 
-# The types of a cell in a finding's table. They are stored if they do not follow from the type of the column.
-_KINDS: tuple[type, ...] = (type(None), bool, int, float, str)
-_WHOLE = 2**53  # every smaller integer is exactly a float
-_OUTCOMES, _KIND = "holds", "kind of "
-
-
-def columns_of(name: str, table: finding.Table) -> tuple[Table, dict[str, Any]]:
-    """Return a finding's table as columns to store, and its texts (titles, notes); see `finding_table`."""
-    rows = [[plain(cell) for cell in row] for row in table.rows]
-    columns: list[Column] = []
-    for index, column in enumerate(table.columns):
-        columns += _encoded(f"{index:02d} {safe_name(column.key)}", [row[index] for row in rows], column.unit or "1",
-                            column.title)  # fmt: skip
-    if table.holds:
-        columns += _encoded(_OUTCOMES, list(table.holds), "1", "whether what is claimed held")
-    words = {"table": name, "columns": [asdict(column) for column in table.columns], "rows": len(rows),
-             "judged": bool(table.holds), "digits": table.digits, "note": table.note, "timed_rows": table.timed_rows}
-    return Table(name, tuple(columns), table.note, command="iapb reproduce"), words
-
-
-def finding_table(stored: Table | None, words: Mapping[str, Any]) -> finding.Table:
-    """Return the finding's table that `columns_of` converted; every cell has its original value and type."""
-    columns = tuple(finding.Column(**column) for column in words["columns"])
-    cells = [_decoded(stored, f"{index:02d} {safe_name(column.key)}") if stored else []
-             for index, column in enumerate(columns)]  # fmt: skip
-    rows = tuple(zip(*cells, strict=True)) if columns else ((),) * words["rows"]
-    holds = tuple(_decoded(stored, _OUTCOMES)) if stored and words["judged"] else ()
-    return finding.Table(columns, rows, holds, words["digits"], words["note"], words["timed_rows"])
-
-
 def safe_name(text: str) -> str:
     """Return a text as a valid name in a file."""
     return re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_") or "table"
-
-
-def _encoded(name: str, cells: list[Any], unit: str, description: str) -> list[Column]:
-    """Return cells as one column, of numbers if all are numbers, else of texts.
-
-    If the types of the cells do not follow from this column, return a second column with the type of each cell.
-    """
-    if wrong := [cell for cell in cells if type(cell) not in _KINDS]:
-        raise ArgumentError(f"cell of {name}", wrong[0], "a number, a text, a truth value or None")
-    kinds = {type(cell) for cell in cells}
-    numbers, large = kinds - {type(None)}, any(isinstance(cell, int) and abs(cell) > _WHOLE for cell in cells)
-    values: Any
-    if str in kinds or large:
-        values = tuple("" if cell is None else cell if isinstance(cell, str) else repr(cell) for cell in cells)
-    elif numbers == {int}:
-        values = np.array([0 if cell is None else cell for cell in cells], np.int64)
-    else:
-        values = np.array([np.nan if cell is None else float(cell) for cell in cells])
-    column = Column(name, values, unit, description)
-    if kinds in ({str}, {float}) or (kinds == {int} and not large):
-        return [column]
-    codes = np.array([_KINDS.index(type(cell)) for cell in cells], np.uint8)
-    words = ", ".join(f"{code} {kind.__name__}" for code, kind in enumerate(_KINDS))
-    return [column, Column(_KIND + name, codes, "1", f"type of each value: {words}")]
-
-
-def _decoded(table: Table, name: str) -> list[Any]:
-    values = table[name]
-    cells = list(values) if isinstance(values, tuple) else values.tolist()
-    if _KIND + name not in (column.name for column in table.columns):
-        return cells
-    return [None if code == 0 else cell == "True" if code == 1 and isinstance(cell, str) else _KINDS[code](cell)
-            for cell, code in zip(cells, table[_KIND + name].tolist(), strict=True)]  # fmt: skip

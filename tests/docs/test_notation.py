@@ -11,7 +11,7 @@ from iapb import find_scene, simulate
 from reports.store.schema import GROUPS
 
 PAGE = (ROOT / "docs/notation.md").read_text(encoding="utf-8")
-QUANTITIES = [(group, quantity) for group, (quantities, _, _) in GROUPS.items() for quantity in quantities]
+QUANTITIES = [(group, quantity) for group, (quantities, _) in GROUPS.items() for quantity in quantities]
 
 
 def units_of(name: str) -> set[str]:

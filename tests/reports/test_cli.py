@@ -222,7 +222,7 @@ def test_the_store_checks_a_file_that_is_named_and_cares_for_folders_only(iapb, 
         assert status == 1 and f"a folder of results: {action} is not for one file" in err and path.is_file()
 
 
-@pytest.mark.parametrize("action", ["check", "repair", "gc", "again", "mark"])
+@pytest.mark.parametrize("action", ["check", "repair", "gc", "again"])
 def test_the_store_does_not_care_for_a_whole_file_system(action, iapb):
     root = Path.cwd().anchor
     status, _, err = iapb("store", action, root)

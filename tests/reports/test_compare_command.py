@@ -9,7 +9,6 @@ import pytest
 
 from reports import cli
 from reports.commands.lines import WIDTH, sentence, table_lines
-from reports.store import read_tables
 from verification.finding import titled
 
 SLOPE = Path(__file__).parents[1] / "verification" / "worlds" / "slope.yaml"
@@ -26,17 +25,16 @@ def iapb(capsys):
 
 def test_a_scene_is_compared_on_one_page_and_stored_with_its_figure(iapb, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    place = Path("mine/slope.h5")
+    place = Path("mine/slope.json")
     status, out, err = iapb("compare", SLOPE, *SHORT, "--out", place)
     assert status == 0, err
     lines = out.splitlines()
     assert max(map(len, lines)) <= WIDTH and len(lines) < 60
     for said in ("Closest to ideal-friction is ", "ideal ignores friction, stiffness, damping.", f"Stored in {place}"):
         assert said in out
-    tables = read_tables(place)
-    assert set(tables) == {"worlds", "over_time", "finding"}
-    assert json.loads(tables["finding"]["json"][0])["details"]["worlds"] == "IAPB, ideal, ideal-friction"
-    assert len(tables["over_time"]["01 time"]) == 3 * 51
+    found = json.loads(place.read_text(encoding="utf-8"))
+    assert set(found["tables"]) == {"worlds", "over time"} and len(found["tables"]["over time"]["rows"]) == 3 * 51
+    assert found["details"]["worlds"] == "IAPB, ideal, ideal-friction"
     picture = place.with_suffix(".svg").read_text(encoding="utf-8")
     assert "ideal-friction (reference)" in picture and "penetration [mm]" in picture
 
@@ -54,7 +52,7 @@ def test_what_a_solver_did_not_solve_is_said_with_its_reason(iapb, tmp_path, mon
         assert by_solver["pinocchio_pgs"] == ["1", "0", "1", "0"]
         said = " ".join(out.split())
         assert "pinocchio_pgs refused 1, such as impact 1 at 0.115 s, μ = 0.2: takes contacts of three" in said
-    assert Path("out/compare/door.h5").is_file() and Path("out/compare/door.svg").is_file()
+    assert Path("out/compare/door.json").is_file() and Path("out/compare/door.svg").is_file()
 
 
 def test_json_goes_to_stdout_or_to_the_file(iapb, tmp_path):
@@ -77,9 +75,9 @@ def test_problem_files_are_listed_with_who_did_not_solve_them_and_stored(iapb, t
     rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line[:4] in ("two.", "none", "bad.")}
     assert status == 0 and max(map(len, out.splitlines())) <= WIDTH
     assert int(rows["two.lcp"][2]) > 3 and rows["none.lcp"][2] == "0" and rows["bad.lcp"][3:5] == ["not", "read:"]
-    assert "Stored in out/compare/problems.h5" in out
-    tables = read_tables("out/compare/problems.h5")
-    assert set(tables) == {"given", "finding"} and tables["given"]["00 problem"][0] == "none.lcp"
+    assert "Stored in out/compare/problems.json" in out
+    tables = json.loads(Path("out/compare/problems.json").read_text(encoding="utf-8"))["tables"]
+    assert set(tables) == {"given"} and tables["given"]["rows"][0][0] == "none.lcp"
 
 
 @pytest.mark.parametrize(
@@ -87,7 +85,7 @@ def test_problem_files_are_listed_with_who_did_not_solve_them_and_stored(iapb, t
     [
         ((SLOPE, "--worlds", "ideel"), 1, "did you mean ideal?"),
         ((SLOPE, "--against", "best"), 1, "against = 'best'"),
-        ((SLOPE, "--out", "x.csv"), 1, "ends in .h5 or .json"),
+        ((SLOPE, "--out", "x.csv"), 1, "ends in .json"),
         (("peg_cornr",), 1, "did you mean peg_corner?"),
         (("--worlds", "PB"), 2, "give a SCENE"),
         (("--against", "PB"), 2, "give a SCENE"),

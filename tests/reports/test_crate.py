@@ -14,9 +14,8 @@ import pytest
 
 from iapb.scene import find_scene, load_scene
 from reports import companions, provenance
-from reports.companions import DIRTY_NAME, MANIFEST_NAME, remembering, write_companions
+from reports.companions import DIRTY_NAME, remembering, write_companions
 from reports.crate import CRATE_NAME, PROFILE, sha256
-from reports.drafts import CODECHECK_NAME, RESCIENCE_NAME
 from reports.evidence import gather
 from reports.evidence.manifest import ABSENT, manifest
 from reports.evidence.stage import Stage
@@ -73,7 +72,7 @@ def test_the_crate_says_what_ro_crate_1_1_asks_for(out: Path) -> None:
     assert {entities[root[role]["@id"]]["@type"] for role in ("author", "publisher")} == {"Organization"}
     assert {"@type", "name", "description", "datePublished"} <= set(root) and root["license"]["@id"].endswith("MIT")
     on_disk = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
-    marks = {"runs/index.jsonl", f"runs/{MARK_NAME}", f"tables/{MARK_NAME}"}
+    marks = {f"runs/{MARK_NAME}", f"tables/{MARK_NAME}"}
     parts = {part["@id"] for part in root["hasPart"]}
     assert parts == on_disk - {CRATE_NAME} - marks == {part["@id"] for part in action["result"]}
     assert action["@type"] == "CreateAction" and "claims 20050601" in action["description"]
@@ -104,13 +103,8 @@ def test_every_file_it_names_has_the_size_and_the_hash_it_states(out: Path) -> N
 
 
 def test_the_manifest_lists_each_run_with_its_users_and_its_command(out: Path) -> None:
-    content = json.loads((out / MANIFEST_NAME).read_text())
-    [shipped, own], [table] = content["runs"], content["tables"]
-    assert shipped["used_by"] == own["used_by"] == ["C07"] and shipped["status"] == "complete"
-    assert shipped["command"].startswith("iapb run peg_corner") and own["command"].startswith("iapb store again ")
-    assert (out / shipped["file"]).stat().st_size == shipped["size"] and (out / table["file"]).is_file()
     page = (out / "report" / "manifest.html").read_text()
-    assert "2 runs and 1 tables" in page and shipped["command"] in page
+    assert "2 runs and 1 tables" in page and "iapb run peg_corner" in page and "iapb store again " in page
 
 
 def test_a_run_that_was_removed_is_said_to_be_absent(tmp_path: Path) -> None:
@@ -130,29 +124,11 @@ def test_the_numbers_are_those_of_the_tables_and_of_the_figures(out: Path) -> No
     assert list(numbers.runs)[0] == "iapb run peg_corner --set duration=0.4 --world PB"
 
 
-def test_the_draft_of_the_codecheck_is_yaml_and_its_files_exist(out: Path) -> None:
-    from ruamel.yaml import YAML
-
-    draft = YAML(typ="safe").load(out / CODECHECK_NAME)
-    assert draft["version"].startswith("https://codecheck.org.uk/spec/config/")
-    assert all((out / entry["file"]).is_file() and entry["comment"] for entry in draft["manifest"])
-    assert draft["codechecker"] == [{"name": "", "ORCID": ""}]  # nobody has checked it yet
-
-
-def test_the_draft_for_rescience_has_the_verdict_of_each_claim(out: Path) -> None:
-    from ruamel.yaml import YAML
-
-    draft = YAML(typ="safe").load(out / RESCIENCE_NAME)
-    assert draft["title"].startswith("[Re] Haptic rendering") and draft["verdicts"] == {"C07": REPRODUCED}
-    assert f"1 {REPRODUCED}" in draft["abstract"] and "iapb reproduce" in draft["abstract"]
-    assert (out / draft["data"][0]["url"]).is_file()
-
-
 def test_nothing_says_on_which_machine_it_was_made(out: Path) -> None:
     host = re.compile(rf"\b{re.escape(socket.gethostname())}\b")
     root = str(Path(__file__).resolve().parents[2])
     pages = [path.relative_to(out) for path in (out / "report").iterdir()]
-    for name in (FIRST_PAGE, *pages, NUMBERS_NAME, MANIFEST_NAME, CRATE_NAME, CODECHECK_NAME, RESCIENCE_NAME):
+    for name in (FIRST_PAGE, *pages, NUMBERS_NAME, CRATE_NAME):
         text = (out / name).read_text()
         assert str(out) not in text and root not in text and str(Path.home()) + "/" not in text
         assert not host.search(text) or len(socket.gethostname()) < 4, name  # "x86" would be found in any page

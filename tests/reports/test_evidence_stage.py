@@ -12,15 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError, RunFileError
+from iapb.errors import RunFileError
 from iapb.scene import find_scene, load_scene
 from reports.evidence import depends
 from reports.evidence import stage as stages
-from reports.evidence.stage import Stage, plain_records
+from reports.evidence.stage import Stage
 from reports.provenance import UNKNOWN, dispatched, linear_algebra, this_machine
 from reports.runner import Runner
 from reports.store import keys
-from reports.store.tables import columns_of, finding_table, read_table, read_tables, write_table
 from verification.finding import VERDICTS, Column, Failure, Finding, Part, Table, finding_of, titled
 
 
@@ -62,7 +61,7 @@ def test_numpy_values_become_plain_ones(tmp_path):
     stage = Stage(tmp_path, "one", Record, {})
     [computed, read] = [stage.get_or_compute(lambda: record) for _ in range(2)]
     assert same(computed, read) and type(read.value) is float and type(read.holds) is bool
-    assert plain_records({"a": (np.int64(1),)}, {}) == {"a": [1]}
+    assert keys.plain({"a": (np.int64(1),)}) == {"a": [1]}
 
 
 def test_runs_are_remembered_beside_the_records(tmp_path):
@@ -82,8 +81,8 @@ def test_runs_are_remembered_beside_the_records(tmp_path):
         assert runner.used == stage.runs
         seen.append(stage.runs)
     assert seen[0] == seen[1] and [run.used_by for run in seen[0].values()] == [("claims",), ("C07",)]
-    listed = read_table(stage.path, "runs used")
-    assert list(listed["command"]) == [f"iapb run peg_corner --set duration=0.4 --world {w}" for w in ("IAPB", "PB")]
+    wanted = [f"iapb run peg_corner --set duration=0.4 --world {w}" for w in ("IAPB", "PB")]
+    assert [run.command for run in stage.runs.values()] == wanted
 
 
 def test_what_a_stage_reads_beside_the_project_is_in_its_key(tmp_path, monkeypatch):
@@ -166,20 +165,6 @@ def test_a_damaged_file_is_an_error_not_a_result(tmp_path):
         stage.get_or_compute(lambda: RECORDS[0])
 
 
-def test_a_table_is_columns_with_units_and_no_rows_are_in_the_words(tmp_path):
-    stage = Stage(tmp_path, "claims", tuple[Record, ...], {})
-    stage.get_or_compute(lambda: RECORDS)
-    columns = read_table(stage.path, "C01")
-    assert [column.name for column in columns.columns] == [
-        "00 scene", "01 time", "02 gain", "kind of 02 gain", "03 holds", "kind of 03 holds"]
-    assert list(columns["00 scene"]) == ["peg", "arm"] and columns["01 time"].tolist() == [0.25, 1.5]
-    assert math.isnan(columns["02 gain"][0]) and columns["02 gain"][1] == 1e-16
-    assert columns["03 holds"].tolist() == [1.0, 0.0]
-    assert [column.unit for column in columns.columns][:2] == ["1", "s"]
-    [text] = read_table(stage.path, "records")["json"]
-    assert "arm" not in text and "of the peg" in text  # a cell, and the note
-
-
 ANY = (None, math.nan, math.inf, -math.inf, -0.0, 0.1, 5e-324, 3, -(2**53) - 1, 2**70, True, False,
        "", "é", "nan", "True", "None")  # fmt: skip
 CELLS = {
@@ -193,8 +178,8 @@ CELLS = {
 @pytest.mark.parametrize("cells", [*CELLS.values(), ANY], ids=[*CELLS, "any"])
 def test_every_cell_comes_back_with_its_type(tmp_path, cells):
     table = Table((Column("a/b", "m"), Column("row")), tuple((cell, 0) for cell in cells))
-    stored, words = columns_of("t", table)
-    assert same(finding_table(read_table(write_table(tmp_path / "t.h5", stored)), words), table)
+    [_, read] = [Stage(tmp_path, "one", Table, {}).get_or_compute(lambda: table) for _ in range(2)]
+    assert same(read, table)
 
 
 def test_a_finding_comes_back_equal_in_every_field(tmp_path):
@@ -208,15 +193,3 @@ def test_a_finding_comes_back_equal_in_every_field(tmp_path):
     [computed, read] = [stage.get_or_compute(lambda: made) for _ in range(2)]
     assert same(computed, read) and same(read.tables["judged"], judged) and read == made
     assert stage.path.name.endswith("-incomplete.h5")  # it has a case that failed
-
-
-def test_a_cell_that_no_file_holds_is_refused():
-    with pytest.raises(ArgumentError, match="truth value"):
-        columns_of("t", titled(("x",), (([1],),)))
-
-
-def test_every_table_is_found_and_none_replaces_another(tmp_path):
-    records = ({"C01": TABLE, "part b": [TABLE, titled(("empty",), ())], "C01 again": [TABLE, TABLE]},)
-    stage = Stage(tmp_path, "many", tuple[dict[str, Table | list[Table]], ...], {})
-    assert same(stage.get_or_compute(lambda: records), records)
-    assert {"C01", "part_b", "part_b_2", "C01_again", "C01_again_2"} < set(read_tables(stage.path))

@@ -27,7 +27,7 @@ MOST_SERIES = 6
 # modules that choose colours themselves -> why those are no series
 OWN_COLOURS = {
     "style": "the table itself",
-    "stability": "marks of a verdict", "complementarity": "marks of a verdict",
+    "film": "marks of contacts", "stability": "marks of a verdict", "complementarity": "marks of a verdict",
     "engine_errors": "cells of a table", "cost": "cells of a table", "scenes_ledger": "layers of energy",
     "fig05_couplings": "wires of a diagram", "two_link_arm": "arrows of a drawing",
     "scenes_plane": "arrows of a drawing", "mechanics": "bounds without a mark",

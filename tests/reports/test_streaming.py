@@ -49,7 +49,7 @@ def test_a_streamed_run_has_the_content_of_one_held_in_memory(
     assert streamed.entry.content_hash == whole(name, world, steps) == content_hash(read_run(place.path))
     with opened_run(place.path) as (run, _):
         assert run.steps == steps and run.chunk_steps[:].sum() == steps
-    assert {path.suffix for path in tmp_path.iterdir()} == {".h5", ".jsonl", ".json"}  # no log is left
+    assert {path.suffix for path in tmp_path.iterdir()} == {".h5", ".json"}  # no log is left
 
 
 class Interrupting:

@@ -1,8 +1,6 @@
 """What may happen to a store of runs, done to it on purpose: `FAULTS` by name, each `fault(folder, times)`.
 
     python -m tests.robustness.faults --times 120      (part of make fuzz)
-
-The result is kept in last_result.json beside this file; the report shows it.
 """
 
 from __future__ import annotations
@@ -17,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf
 from multiprocessing import get_context
@@ -35,7 +33,6 @@ from reports.store.keys import content_hash
 from reports.store.runs import read_run
 from reports.store.schema import FORMAT_VERSION
 from tests.robustness.kills import KILLS
-from tests.robustness.last_result import remember
 
 
 @dataclass(frozen=True)
@@ -340,7 +337,7 @@ def _tried(name: str, fault: Callable[[Path, int], tuple[int, int, int, str]], f
 
 
 def main() -> int:
-    """Try the faults and keep the result; return 0 if all were survived, else 1."""
+    """Try the faults; return 0 if all were survived, else 1."""
     parser = argparse.ArgumentParser(prog="python -m tests.robustness.faults", description=__doc__.splitlines()[0])
     parser.add_argument("--times", type=int, default=120, help="how often each fault is done")
     parser.add_argument("--kills", type=int, default=102, help="how often a command is killed, in all")
@@ -351,9 +348,6 @@ def main() -> int:
         kills = {name: partial(kill, seconds=given.seconds) for name, kill in KILLS.items()}
         records = try_faults(Path(folder) / "commands", -(-given.kills // len(KILLS)), kills, given.jobs)
         records = try_faults(Path(folder) / "store", given.times, jobs=given.jobs) + records
-    limit = f" --seconds {given.seconds:g}" if given.seconds < inf else ""
-    remember("faults", f"python -m tests.robustness.faults --times {given.times} --kills {given.kills}{limit}",
-             ("fault", "tried", "survived", "lost", "what one reads"), [astuple(one) for one in records])
     return int(any(one.survived < one.tried or one.lost for one in records))
 
 

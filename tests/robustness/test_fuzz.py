@@ -84,7 +84,6 @@ def test_a_reader_that_kills_its_process_is_found(
 ) -> None:
     planted = {"fragile": Kind("fragile", lambda: {"x": b""}, number_of_case, fragile)}
     monkeypatch.setattr("tests.robustness.fuzz.KINDS", planted)
-    monkeypatch.setattr("tests.robustness.fuzz.remember", lambda *_: None)
     assert main(["--cases", "12", "--keep", str(tmp_path)]) == 1
     kept = [path.read_bytes() for path in (tmp_path / "fragile").glob("*-x")]
     killed, raised = kept.count(b"\0"), kept.count(b"\1")

@@ -18,7 +18,6 @@ import pytest
 from iapb import find_scene, load_scene
 from iapb.run import Run
 from iapb.scene.mechanism import mechanism_of
-from iapb.scene.model import SpatialScene
 from reports.figures import RECIPES
 from reports.figures.two_link_arm import arm_energies
 from reports.pages.builder import build_report
@@ -33,8 +32,7 @@ ARGUMENTS = (
 )  # fmt: skip
 DESK, PHONE = (1400, 900), (400, 800)
 STEPS, UNTOUCHED = 128, 40
-FIGURES = ("fig07", "fig08", "film-corner", "film-obstacles", "fig03")
-SPATIAL = {"space/arm_obstacles": "arm_obstacles"}  # the runs that are not of the peg in the corner
+FIGURES = ("fig07", "fig08", "film-corner", "film-hole", "fig03")
 
 
 @dataclass
@@ -93,7 +91,7 @@ def made_motion(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
     start = np.concatenate([np.asarray(body["position"], dtype=float) for body in resolved["bodies"]])
     time = np.arange(STEPS + 1) / 512
     swing = 0.002 * np.sin(np.outer(40 * time, 1 + 0.1 * seed + np.arange(len(start))))
-    pose = mechanism_of(loaded).poses(start + swing, planar=not isinstance(loaded, SpatialScene))
+    pose = mechanism_of(loaded).poses(start + swing, planar=True)
     run = make_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, pose=pose,
                    scene_name=scene, scene_resolved=resolved)
     late = np.where(np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets)  # nothing touches before
@@ -106,7 +104,7 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
     """Made-up records: a little of each kind, wide tables and long words among them."""
     recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
     names = sorted({name for recipe in recipes for name in recipe.needs if "/" in name})
-    runs = {name: made_motion(make_run, SPATIAL.get(name, "peg_corner"), k) for k, name in enumerate(names)}
+    runs = {name: made_motion(make_run, "peg_corner", k) for k, name in enumerate(names)}
     table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
     return Evidence(
         inputs={**runs, "arm_energies": arm_energies()},

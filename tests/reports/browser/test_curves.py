@@ -1,4 +1,4 @@
-"""Curves in the browser: worlds can be hidden, the cursor reads the run's values, a part can be magnified."""
+"""Curves in the browser: worlds can be hidden, the cursor reads the run's values."""
 
 from __future__ import annotations
 
@@ -38,22 +38,3 @@ def test_the_cursor_reads_the_values_of_the_run(desk: Any, evidence: Evidence) -
     assert near.min() - kept <= float(rows["ideal"]) <= near.max() + kept
     assert np.ptp(near) < np.ptp(x) / 10  # or the bracket would say nothing
     assert desk.page.locator("#fig07 .readout:visible").count() == 6  # the panels over time read together
-
-
-def test_curves_are_zoomed_by_dragging_and_by_keys(desk: Any) -> None:
-    plot = desk.page.locator("#fig07 svg[data-trace=time]").first
-    curve = plot.locator("[data-curve='ideal'] > path").first
-    whole = curve.get_attribute("d")
-    plot.scroll_into_view_if_needed()
-    box = plot.bounding_box()
-    desk.page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 50)
-    desk.page.mouse.down()
-    desk.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
-    desk.page.mouse.up()
-    assert "zoomed" in plot.get_attribute("class") and curve.get_attribute("d") != whole
-    assert len(plot.locator(".ticks text").all()) >= 4
-    plot.press("0")
-    assert "zoomed" not in (plot.get_attribute("class") or "")
-    plot.press("+")
-    assert "zoomed" in plot.get_attribute("class")
-    assert desk.errors == []

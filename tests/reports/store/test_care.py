@@ -40,10 +40,8 @@ from reports.store.care import (
     check_store,
     collect_garbage,
     garbage,
-    mark_stores,
     repair_store,
 )
-from reports.store.folder import INDEX_NAME
 from reports.store.io import MARK_NAME
 from reports.store.keys import SOURCES
 from reports.store.runs import store_run
@@ -167,8 +165,6 @@ def strew(folder: Path) -> None:
         (place / ".noted.h5.77.writing").write_bytes((place / "noted-0123456789abcdef.h5").read_bytes())
         (place / ".text.h5.77.writing").write_bytes(b"somebody else's")
         (place / ".twin.h5.77.writing").hardlink_to(place / "noted-0123456789abcdef.h5")
-        if place != folder:
-            (place / INDEX_NAME).write_text('{"file": "thesis_results.h5"}')
         (place / "link.h5").symlink_to(place / "thesis_results.h5")
     for path in folder.rglob("*"):
         if not path.is_symlink() and path.is_file():
@@ -178,10 +174,10 @@ def strew(folder: Path) -> None:
 def test_nothing_of_somebody_elses_is_touched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     strew(tmp_path / "theirs")
     before = tree(tmp_path)
-    for words in (["gc", "--delete"], ["repair"], ["mark"], ["gc"], ["check"]):
+    for words in (["gc", "--delete"], ["repair"], ["gc"], ["check"]):
         status = main(["store", words[0], str(tmp_path / "theirs"), *words[1:]])
         assert status == (1 if words[0] in ("gc", "repair") else 0)
-    assert tree(tmp_path) == before and "iapb store mark" in capsys.readouterr().err
+    assert tree(tmp_path) == before and "a store of iapb" in capsys.readouterr().err
 
 
 def test_nothing_of_somebody_elses_in_a_store_is_touched_either(filled: Path) -> None:
@@ -198,15 +194,14 @@ def test_nothing_of_somebody_elses_in_a_store_is_touched_either(filled: Path) ->
     assert main(["store", "gc", str(filled)]) == 0
     assert spoilt.with_name(spoilt.name + DAMAGED_SUFFIX).is_file()  # it only lists
     assert main(["store", "gc", str(filled), "--delete"]) == 0
-    ours = {f"runs/{spoilt.name}": "", f"runs/{INDEX_NAME}": ""}  # the one that went, and the index of the store
+    ours = {f"runs/{spoilt.name}": ""}  # the one that went
     assert {**tree(filled), **ours} == {**before, **ours}
 
 
-def test_stores_of_older_versions_are_marked_when_asked_to_or_written_to(filled: Path) -> None:
+def test_a_store_is_marked_when_it_is_written_to(filled: Path) -> None:
     (filled / "runs" / MARK_NAME).unlink()
-    with pytest.raises(ArgumentError, match="iapb store mark"):
+    with pytest.raises(ArgumentError, match="a store of iapb"):
         garbage(filled)
-    assert mark_stores(filled) == (filled / "runs",) and mark_stores(filled) == ()
     (filled / "runs" / MARK_NAME).write_text('{"format": "iapb store", "format_version": 2}')  # of a later version
     with pytest.raises(ArgumentError):
         repair_store(filled)

@@ -18,7 +18,6 @@ import pytest
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.store import Checkpoint, RunStore, folder, io, read_run, run_key, runs
-from reports.store.folder import INDEX_NAME
 from reports.store.io import mark_store
 from reports.store.keys import content_hash
 
@@ -60,7 +59,7 @@ def test_the_key_forgets_order_and_number_type_but_not_the_code() -> None:
 
 
 def test_an_input_that_has_no_text_is_refused() -> None:
-    with pytest.raises(ArgumentError, match="inputs"):
+    with pytest.raises(ArgumentError, match="value"):
         run_key({"law": object()})
 
 
@@ -117,7 +116,7 @@ def test_a_new_run_has_its_key_and_hash_taken_once_and_its_file_not_read_back(
     assert calls == {"run_key": 1, "place_of": 1, "content_hash": 1, "sealed": 1}  # its bytes are hashed once
     store.get_or_run(INPUTS, Counter(make_run()))  # reads: opened once, judged once
     assert calls == {"run_key": 2, "place_of": 2, "content_hash": 2, "sealed": 1, "opened": 1, "_checksum": 1}
-    assert len(store.entries()) == 1 and calls["opened"] == 1
+    assert len(store.entries()) == 1
 
 
 def _counted(calls: collections.Counter[str], name: str, function: Any) -> Any:
@@ -186,15 +185,13 @@ def test_what_a_killed_writer_left_aside_is_removed_once_it_is_old(tmp_path: Pat
     assert not old.exists() and young.exists() and theirs.exists()
 
 
-def test_the_index_tells_the_truth(tmp_path: Path, make_run: MakeRun) -> None:
+def test_the_entries_are_those_of_the_files(tmp_path: Path, make_run: MakeRun) -> None:
     store = RunStore(tmp_path)
     for world in ("IAPB", "PB"):
         store.put({"world": world}, make_run(world=world), label=world)
     assert [entry.title for entry in store.entries()] == ["peg · IAPB", "peg · PB"]
     assert store.entries()[0].content_hash == content_hash(make_run())
     (tmp_path / store.entries()[0].file).unlink()
-    assert [entry.title for entry in store.entries()] == ["peg · PB"]
-    (tmp_path / INDEX_NAME).write_text('{"cut off')
     assert [entry.title for entry in store.entries()] == ["peg · PB"]
 
 

@@ -118,7 +118,7 @@ def test_xarray_opens_it_with_units_and_dimensions(tmp_path: Path, make_run: Mak
         assert str(tree["scene/source"].values) == run.scene_source
 
 
-def test_numbers_are_checksummed_and_viewers_know_what_to_draw(tmp_path: Path, make_run: MakeRun) -> None:
+def test_numbers_are_checksummed(tmp_path: Path, make_run: MakeRun) -> None:
     with h5py.File(write_run(tmp_path / "run.h5", make_run())) as file:
 
         def check(name: str, item: Any) -> None:
@@ -126,9 +126,6 @@ def test_numbers_are_checksummed_and_viewers_know_what_to_draw(tmp_path: Path, m
                 assert item.fletcher32 and item.shuffle and item.compression == "gzip", name
 
         file.visititems(check)
-        default = file[file.attrs["default"]]
-        assert default.attrs["NX_class"] == "NXdata" and default.attrs["signal"] in default
-        assert all(axis == "." or axis in default for axis in default.attrs["axes"])
 
 
 @settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
