@@ -230,7 +230,7 @@ class Recorder:
             "energy": Later(lambda run: _shown(ledger(run), run)),
             "distrust": Later(partial(_distrust, self._at_first)),
         }
-        remarks = system.remarks + (UNSOLVED,) * bool(simulation.state.rest_work.counts[1])
+        remarks = system.remarks + (UNSOLVED,) * bool(simulation.state.rest_work.shortened[0])
         return Run(
             scene_name=scene.name, world=world or f"{law.name} + {coupling.name}",
             law=law.name, law_settings=dict(law.settings), coupling=coupling.name,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ Integers = NDArray[np.int64]
 Indices = NDArray[np.int32]
 Booleans = NDArray[np.bool_]
 States = NDArray[np.int8]
+Record = TypeVar("Record")
 
 
 class Quantity(NamedTuple):
@@ -57,3 +58,10 @@ def blank(listed: Iterable[Quantity], lengths: Mapping[str, int],
     """Return one array per quantity, by name, made by `make`; `lengths` of dimensions that are no numbers."""
     return {each.name: make([lengths[name] if name in lengths else int(name) for name in each.dimensions], each.dtype)
             for each in listed}
+
+
+def zeros_of(record: type[Record], **lengths: int) -> Record:
+    """Return a record of arrays of zeros, and of such records, by the lengths of their dimensions."""
+    nested = {name: zeros_of(kind, **lengths) for name, kind in get_type_hints(record).items()
+              if hasattr(kind, "_fields")}
+    return record(**blank(quantities(record), lengths), **nested)

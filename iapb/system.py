@@ -14,13 +14,13 @@ from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, count
 from iapb.compiled import Entry, block, columns, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
-from iapb.contact.kernels.coulomb import make_step_friction
-from iapb.contact.kernels.impact import make_impact_work
-from iapb.contact.kernels.impact_friction import make_friction_work
-from iapb.contact.kernels.implicit import make_rest_work
+from iapb.contact.kernels.coulomb import StepFriction
+from iapb.contact.kernels.impact import ImpactWork
+from iapb.contact.kernels.impact_friction import FrictionWork
+from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
-from iapb.contact.kernels.unilateral import make_push_work
+from iapb.contact.kernels.unilateral import PushWork
 from iapb.contact.kernels.world import State, Stops, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
@@ -45,7 +45,7 @@ from iapb.scene.mechanism import (
     start_of,
     stops_of,
 )
-from iapb.schema import Floats, blank, quantities
+from iapb.schema import Floats, blank, quantities, zeros_of
 
 _factored = Entry(cholesky)
 
@@ -192,10 +192,14 @@ class System:
                                         "root": 9 * trees}),
             body=make_workspace(len(mechanism.bodies), d), contacts=make_contact_buffer(c),
             previous=make_contact_buffer(c), stage_contacts=make_contact_buffer(c),
-            work=make_impact_work(d, rows), push_work=make_push_work(d, rows),
-            friction_work=make_friction_work(d * sliding, rows * sliding, tangents),
-            step_friction=make_step_friction(d, c * creeping, tangents, largest),
-            rest_work=make_rest_work(d * implicit, c * implicit, 1 + tangents, largest, trees),
+            work=zeros_of(ImpactWork, velocity=d, row=rows),
+            push_work=zeros_of(PushWork, velocity=d, row=rows, passive=d + 1),
+            friction_work=zeros_of(FrictionWork, velocity=d * sliding, row=rows * sliding,
+                                   tangent=rows * tangents * sliding, direction=tangents),
+            step_friction=zeros_of(StepFriction, velocity=d, contact=c * creeping, row=c * tangents * creeping,
+                                   width=2 * largest, direction=tangents),
+            rest_work=zeros_of(RestWork, velocity=d * implicit, contact=c * implicit,
+                               row=c * (1 + tangents) * implicit, width=2 * largest, tree=trees),
             impacts=columns("ImpactLog", {"logged": np.zeros(1, np.int64), **log}),
         )
         state.q[:], state.v[:] = self.start

@@ -6,10 +6,9 @@ the row space of A, which is applied through an orthonormal basis. `verification
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,13 +18,14 @@ from iapb.contact.kernels.resolve import (
     LARGEST_ENTRY,
     NOT_CONVERGED,
     SYMMETRY_TOLERANCE,
+    ResolveWork,
     Results,
-    make_resolve_work,
     resolve_each,
 )
 from iapb.errors import ArgumentError, IapbError, RangeError, SolverError
 from iapb.linalg import cholesky
 from iapb.names import one_of
+from iapb.schema import zeros_of
 
 Floats = NDArray[np.float64]
 Arrays = tuple[Floats, Floats, Floats]  # M (n, d, d), J (n, c, d), v (n, d)
@@ -38,8 +38,7 @@ _MANY = "mass_matrices", "contact_jacobians", "velocities"
 _DOUBLE = np.dtype(np.float64)
 
 
-@dataclass(frozen=True)
-class Impact:
+class Impact(NamedTuple):
     """The result of an impact (SI units; d generalized velocities, c contacts, m tangents each).
 
     The result of n impacts (`resolve_impacts`) has n of each quantity, along the first axis.
@@ -225,14 +224,12 @@ def resolve_frictional_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLik
                     directions=T.shape[1])
 
 
-def _resolve(arrays: Arrays, restitution: Floats, law: str,
-             options: tuple[int | None, bool, float], *, method: str = "factored", unequal: Floats | None = None,
-             tangents: Floats | None = None, friction: Floats | None = None, directions: int = 0,
-             many: bool = False) -> Impact:
+def _resolve(arrays: Arrays, restitution: Floats, law: str, options: tuple[int | None, bool, float], *,
+             method: str = "factored", unequal: Floats | None = None, tangents: Floats | None = None,
+             friction: Floats | None = None, directions: int = 0, many: bool = False) -> Impact:
     """Resolve n impacts in one compiled call; return the first, or all if there are many."""
     (n, c, d), (budget, clamped, tolerance) = arrays[1].shape, options
-    out = Results(np.empty((n, d)), np.empty((n, d)), np.empty((n, c)), np.empty((n, c * directions)),
-                  np.empty((n, 2), np.int64), np.empty((n, 5)))
+    out = Results(np.empty((n, d)), np.empty((n, d)), np.empty((n, c)), np.empty((n, c * directions)), np.empty((n, 7)))
     limit = d if budget is None else min(budget, d)
     done = _ENTRIES[law](*arrays, restitution, unequal, tangents, friction, tolerance, limit, clamped,
                          _scratch(d, c, directions), out)
@@ -240,18 +237,20 @@ def _resolve(arrays: Arrays, restitution: Floats, law: str,
         raise diagnose(*arrays, out, done, many)
     along = out.tangential.reshape(n, c, directions)
     if many:
-        change, low, high, clamp, share = out.numbers.T
-        return Impact(*out[:3], out.ends[:, 0], change, np.column_stack((low, high)), clamp,
-                      np.array(_STATUS)[out.ends[:, 1]], method, law, budget, along, share)
-    (rank, status), (change, low, high, clamp, share) = out.ends[0].tolist(), out.numbers[0].tolist()
-    return Impact(out.velocity[0], out.generalized_impulse[0], out.impulses[0], rank, change, (low, high), clamp,
-                  _STATUS[status], method, law, budget, along[0], share)
+        rank, status, change, low, high, clamp, share = out.numbers.T
+        return Impact(*out[:3], rank.astype(np.int64), change, np.column_stack((low, high)), clamp,
+                      np.array(_STATUS)[status.astype(np.int64)], method, law, budget, along, share)
+    rank, status, change, low, high, clamp, share = out.numbers[0].tolist()
+    return Impact(out.velocity[0], out.generalized_impulse[0], out.impulses[0], int(rank), change, (low, high), clamp,
+                  _STATUS[int(status)], method, law, budget, along[0], share)
 
 
 @lru_cache(maxsize=8)
 def _scratch(coordinates: int, contacts: int, tangents: int) -> Any:
     """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while it runs."""
-    return block(make_resolve_work(coordinates, contacts, tangents))
+    rows = max(1, contacts)
+    return block(zeros_of(ResolveWork, velocity=coordinates, passive=coordinates + 1, row=rows,
+                          tangent=rows * tangents, direction=tangents))
 
 
 def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: bool) -> IapbError:
@@ -285,7 +284,7 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: 
     if pivot := cholesky(lower, lower):
         expected = f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)"
         return ArgumentError(named(names[0]), M, expected)
-    if out.ends[refused, 1] == NOT_CONVERGED:
+    if out.numbers[refused, 1] == NOT_CONVERGED:
         return SolverError(f"Poisson's law: the active-set method did not converge on {len(J)} contacts")
     quantities = names[2], "generalized_impulse", "impulses", "tangential_impulses"
     for quantity, values in zip(quantities, out, strict=False):
@@ -364,7 +363,6 @@ def _options(budget: Any, clamp: Any, tolerance: Any, can_stop: bool) -> tuple[i
             raise ArgumentError("budget", budget, "None: only 'factored', with one restitution for all, can stop early")
     if clamp is not None and not isinstance(clamp, bool | np.bool_):
         raise ArgumentError("clamp", clamp, "True, False or None")
-    number = isinstance(tolerance, float | int | np.floating)
-    if tolerance is not None and not (number and 0.0 < tolerance < 1.0):
+    if tolerance is not None and not (isinstance(tolerance, float | int | np.floating) and 0.0 < tolerance < 1.0):
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")
     return None if budget is None else int(budget), clamp is None or bool(clamp), float(tolerance or 0.0)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from iapb import resolve_impact
 from iapb.compiled import block, kernel
-from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
 from iapb.errors import MissingDependencyError, SolverError
 from iapb.linalg import cholesky, from_whitened, to_whitened
+from iapb.schema import zeros_of
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 from verification.impacts import ImpactCase
@@ -66,7 +67,7 @@ class KernelCall:
         d, c = len(self.v), case.contacts
         self.budget = d if budget is None else budget
         self.lower, self.v_plus, self.momentum = np.zeros((d, d)), np.zeros(d), np.zeros(d)
-        self.work = block(make_impact_work(d, c))
+        self.work = block(zeros_of(ImpactWork, velocity=d, row=c))
 
     def repeated(self, times: int) -> None:
         """Resolve the impact `times` times."""

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.compiled import block, copy_into, kernel
-from iapb.contact.kernels.impact import factored_impact, make_impact_work, rank_tolerance
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
 from iapb.linalg import cholesky
+from iapb.schema import zeros_of
 
 Floats = NDArray[np.float64]
 
@@ -21,8 +22,8 @@ def resolve_batch(
     """
     d, c = columns.shape[1:]
     v_plus, clamps = np.empty_like(velocity), np.empty(len(velocity))
-    _resolve(mass_matrix, columns, velocity, restitution, clamped, np.empty((d, d)), block(make_impact_work(d, c)),
-             np.empty(d), v_plus, clamps)  # fmt: skip
+    work = block(zeros_of(ImpactWork, velocity=d, row=c))
+    _resolve(mass_matrix, columns, velocity, restitution, clamped, np.empty((d, d)), work, np.empty(d), v_plus, clamps)
     return v_plus, clamps
 
 

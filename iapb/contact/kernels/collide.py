@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from iapb.compiled import kernel
+from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.contact_set import (
     HOLDS,
     LEFT,
@@ -55,56 +55,24 @@ def gather_group(world, state, size):
 
 
 @kernel
-def _store_row(state, size, contact, count):
-    for k in range(size):
-        state.work.columns[k, count] = state.row[state.dofs[k]]
-    state.rows[count] = contact
-
-
-@kernel
 def gather_rows(world, state, island, size):
     """Write the rows of J_c, return how many: (11) against the world; (12), or both of (13)-(14), for two bodies."""
-    contacts = state.contacts
-    count = 0
+    contacts, count = state.contacts, 0
     for i in range(state.contact_count[0]):
         if not contacts.collides[i] or state.island_of_tree[world.tree_of_body[contacts.body_a[i]]] != island:
             continue
-        if world.per_body_rows and contacts.body_b[i] >= 0 and not is_stop(contacts, i):
-            for body in (contacts.body_a[i], contacts.body_b[i]):
+        both = world.per_body_rows and contacts.body_b[i] >= 0 and not is_stop(contacts, i)
+        for side in range(2 if both else 1):
+            if both:
+                body = contacts.body_a[i] if side == 0 else contacts.body_b[i]
                 body_row(world.mechanism, state.body, body, contacts, i, state.row)
-                _store_row(state, size, i, count)
-                count += 1
-        else:
-            direction_row(world.mechanism, state.body, contacts, i, load(contacts.normal, i), state.row)
-            _store_row(state, size, i, count)
+            else:
+                direction_row(world.mechanism, state.body, contacts, i, load(contacts.normal, i), state.row)
+            for k in range(size):
+                state.work.columns[k, count] = state.row[state.dofs[k]]
+            state.rows[count] = i
             count += 1
     return count
-
-
-@kernel
-def gather_tangents(world, state, size, count):
-    """Write the rows of each contact's tangents into the scratch of friction."""
-    contacts, free = state.contacts, state.friction_work.free
-    tangents = state.friction_work.velocity.shape[0]
-    for r in range(count):
-        i = state.rows[r]
-        for a in range(tangents):
-            tangent = tangent_of(load(contacts.normal, i), a, tangents)
-            direction_row(world.mechanism, state.body, contacts, i, tangent, state.row)
-            for k in range(size):
-                free[r * tangents + a, k] = state.row[state.dofs[k]]
-
-
-@kernel
-def gather_restitution(world, state, count):
-    """Write the restitution of each row; return the smallest value, and whether the values differ."""
-    contacts, smallest, largest = state.contacts, 1.0, 0.0
-    for r in range(count):
-        i = state.rows[r]
-        e = pair_restitution(world, contacts, i)
-        state.row_restitution[r] = e
-        smallest, largest = min(smallest, e), max(largest, e)
-    return smallest, smallest < largest
 
 
 @kernel
@@ -151,37 +119,6 @@ def apply_group(world, state, size, share):
     return lost, share
 
 
-@kernel
-def count_approaching(world, work, size, count, share):
-    """Return how many rows still approach after the impact, because of a clamp, a scale or a row not used."""
-    approaching = 0
-    for i in range(count):
-        gamma = 0.0
-        for k in range(size):
-            gamma += work.rows[k, i] * (work.u[k] + share * work.change[k])
-        approaching += work.length[i] * gamma < -world.approach_velocity
-    return approaching
-
-
-@kernel
-def log_impact(state, island, rows, rank, share, applied, clamp, friction_share, solved, approaching, lost, size):
-    """Append one line to the step's impacts."""
-    log = state.impacts
-    n = log.logged[0]
-    log.group[n], log.rows[n], log.rank[n] = island, rows, rank
-    log.scale[n], log.clamp[n], log.energy_lost[n] = share, clamp, lost
-    log.friction_share[n], log.solved[n], log.approaching[n] = friction_share, solved, approaching
-    for k in range(state.v.shape[0]):
-        log.v_minus[n, k] = state.v[k]
-        log.v_plus[n, k] = state.v[k]
-        log.impulse[n, k] = 0.0
-    for i in range(size):
-        k = state.dofs[i]
-        log.v_minus[n, k] = state.group_v[i]
-        log.impulse[n, k] = applied * state.group_impulse[i]
-    log.logged[0] = n + 1
-
-
 @kernel(needs="unequal_restitution pushing implicit", otherwise=(0, 1.0, False))
 def resolve_unequal(world, state, size, count, smallest):
     """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e, which is passive."""
@@ -199,23 +136,34 @@ def resolve_unequal(world, state, size, count, smallest):
 @kernel(needs="impact_friction", otherwise=(1.0, 1.0, True))
 def add_friction_to_impact(world, state, size, count, rank):
     """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
-    gather_tangents(world, state, size, count)
+    contacts, f = state.contacts, state.friction_work
+    tangents = f.velocity.shape[0]
     for r in range(count):
-        state.friction_work.coefficient[r] = friction_of(world, state.contacts, state.rows[r])
+        i = state.rows[r]
+        f.coefficient[r] = friction_of(world, contacts, i)
+        for a in range(tangents):
+            tangent = tangent_of(load(contacts.normal, i), a, tangents)
+            direction_row(world.mechanism, state.body, contacts, i, tangent, state.row)
+            for k in range(size):
+                f.free[r * tangents + a, k] = state.row[state.dofs[k]]
     return add_impact_friction(
         state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size], count, rank,
-        state.work, state.push_work, state.friction_work, state.row_impulse, state.group_v_plus[:size],
-        state.group_impulse[:size])
+        state.work, state.push_work, f, state.row_impulse, state.group_v_plus[:size], state.group_impulse[:size])
 
 
 @kernel
 def resolve_rows(world, state, size, count):
     """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of friction, solved)."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
-    work, e, unequal, solved, friction_share = state.work, world.restitution, False, True, 1.0
+    work, contacts, e, unequal, solved, friction_share = state.work, state.contacts, world.restitution, False, True, 1.0
     if world.switches.unequal_restitution or world.switches.pushing or world.implicit:
-        e, unequal = gather_restitution(world, state, count)
-        unequal = unequal or world.switches.pushing or holds_any(state, count)
+        e, largest, unequal = 1.0, 0.0, world.switches.pushing
+        for r in range(count):
+            i = state.rows[r]
+            own = pair_restitution(world, contacts, i)
+            state.row_restitution[r], e, largest = own, min(e, own), max(largest, own)
+            unequal = unequal or contacts.mark[i] == HOLDS
+        unequal = unequal or e < largest
     if unequal:
         rank, clamp, solved = resolve_unequal(world, state, size, count, e)
     else:
@@ -227,20 +175,20 @@ def resolve_rows(world, state, size, count):
         if unequal and solved:  # Poisson's law needs no basis of the rows, friction does
             span = orthonormal_basis(size, count, rank_tolerance(lower), size, work)
         friction_share, factor, met = add_friction_to_impact(world, state, size, count, span)
-        return rank, clamp * factor, friction_share, solved and met
-    if not (unequal and solved):
+        clamp, solved = clamp * factor, solved and met
+    elif not (unequal and solved):
         minimum_norm_impulses(size, count, rank, work.length, work.change[:size], state.row_impulse, work)
     return rank, clamp, friction_share, solved
 
 
 @kernel
 def resolve_island(world, state, island):
-    """Resolve one simultaneous impact; scale it to the device if the scene has limits."""
-    size = gather_dofs(world, state, island)
+    """Resolve one simultaneous impact; scale it to the device if the scene has limits; log it."""
+    size, work, log = gather_dofs(world, state, island), state.work, state.impacts
     gather_group(world, state, size)
     count = gather_rows(world, state, island, size)
     rank, clamp, friction_share, solved = resolve_rows(world, state, size, count)
-    share = 1.0
+    share, line, approaching = 1.0, log.logged[0], 0
     if world.switches.impulse_limit:
         share = largest_share(state.group_impulse, state.dofs, size, world.dt, world.impulse_limit)
     if world.switches.spreading:
@@ -250,23 +198,26 @@ def resolve_island(world, state, island):
     lost, applied = apply_group(world, state, size, share)
     if applied < share:
         clamp *= applied / share
-    approaching = count_approaching(world, state.work, size, count, applied)
     for r in range(count):
         if r == 0 or state.rows[r] != state.rows[r - 1]:  # of two per-body rows the first is the one on body a
             i, impulse = state.rows[r], applied * state.row_impulse[r]
             before = state.contact_impulse[i]
             state.contact_impulse[i] = impulse if before == 0.0 else before + impulse
-    log_impact(state, island, count, rank, share, applied, clamp, friction_share, solved and clamp > 0.0, approaching,
-               lost, size)
-
-
-@kernel
-def holds_any(state, count):
-    """Return whether any of the rows belongs to a contact that only holds."""
-    for r in range(count):  # noqa: SIM110 - a kernel has no generators
-        if state.contacts.mark[state.rows[r]] == HOLDS:
-            return True
-    return False
+        gamma = 0.0
+        for k in range(size):
+            gamma += work.rows[k, r] * (work.u[k] + applied * work.change[k])
+        approaching += work.length[r] * gamma < -world.approach_velocity
+    log.group[line], log.rows[line], log.rank[line] = island, count, rank
+    log.scale[line], log.clamp[line], log.energy_lost[line] = share, clamp, lost
+    log.friction_share[line], log.solved[line], log.approaching[line] = (
+        friction_share, solved and clamp > 0.0, approaching)
+    copy_into(log.v_minus[line], state.v)
+    copy_into(log.v_plus[line], state.v)
+    log.impulse[line] = 0.0
+    for i in range(size):
+        log.v_minus[line, state.dofs[i]] = state.group_v[i]
+        log.impulse[line, state.dofs[i]] = applied * state.group_impulse[i]
+    log.logged[0] = line + 1
 
 
 @kernel
@@ -277,19 +228,12 @@ def resolve_collisions(world, state):
     collides in its turn, as the balls of a cradle that touch.
     """
     add_supports(world, state)
-    if not find_islands(world, state):
-        return
-    resolve_islands(world, state)
-    while strike_again(world, state):
-        resolve_islands(world, state)
-
-
-@kernel
-def resolve_islands(world, state):
-    """Resolve the impacts of all islands that collide."""
-    for t in range(world.tree_start.shape[0]):
-        if state.collides_of_tree[t]:
-            resolve_island(world, state, t)
+    collide = find_islands(world, state)
+    while collide:
+        for t in range(world.tree_start.shape[0]):
+            if state.collides_of_tree[t]:
+                resolve_island(world, state, t)
+        collide = strike_again(world, state)
 
 
 @kernel(needs="implicit", otherwise=False)

@@ -10,41 +10,70 @@ keeps the work of friction over the step from being positive.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import contact_before, moving_tree
 from iapb.contact.kernels.impact_friction import slide, tangent_inertia
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
-from iapb.linalg import add, add_multiple, dot, dot_of, load, scale, solve_tree_blocks, store
+from iapb.linalg import add, dot, dot_of, load, scale, solve_tree_blocks, store
 from iapb.mechanics.kernels.kinematics import add_point_force
+from iapb.schema import Floats, Integers
 
 SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, and the next step goes on from there
 STILL = 1e-6  # share of the fastest slip: a sweep that changes velocities by less is the last one
 
 
 class StepFriction(NamedTuple):
-    """Scratch of the friction of one step: c contacts, m tangents each (1 planar, 2 spatial), d coordinates."""
+    """Scratch of the friction of one step, with a row for each tangent (1 planar, 2 spatial).
 
-    contact: np.ndarray  # (c,) int64: contacts that carry friction in this step
-    tree: np.ndarray  # (c, 2) int64: their two trees, −1 = none or the same
-    rows: np.ndarray  # (c m, 2 w) tangents' rows of J L⁻ᵀ, w entries for each tree; the rest of a full row is zero
-    slip: np.ndarray  # (c m,) tangential velocity without friction [m/s]
-    p: np.ndarray  # (c m,) tangential impulses [N s]
-    radius: np.ndarray  # (c,) limit μ F_n Δt [N s]
-    inertia: np.ndarray  # (c,) largest eigenvalue of the contact's own block of J M⁻¹ Jᵀ [1/kg]
-    moved: np.ndarray  # (d,) Lᵀ Δv
-    local: np.ndarray  # (2 w,) entries of `moved` for the two trees of one contact
-    velocity: np.ndarray  # (m,)
+    `width` is twice the number of coordinates of the largest tree.
+    """
+
+    contact: Annotated[Integers, "contact"]  # contacts that carry friction in this step
+    at: Annotated[Integers, "contact 2"]  # first coordinate of each of their two trees
+    size: Annotated[Integers, "contact 2"]  # number of coordinates of these; 0 = no tree, or the first one again
+    rows: Annotated[Floats, "row width"]  # rows of J L⁻ᵀ: one half for each of the two trees; the rest is zero
+    slip: Annotated[Floats, "row"]  # tangential velocity without friction [m/s]
+    p: Annotated[Floats, "row"]  # tangential impulses [N s]
+    radius: Annotated[Floats, "contact"]  # limit μ F_n Δt [N s]
+    inertia: Annotated[Floats, "contact"]  # largest eigenvalue of the contact's own block of J M⁻¹ Jᵀ [1/kg]
+    moved: Annotated[Floats, "velocity"]  # Lᵀ Δv
+    local: Annotated[Floats, "width"]  # entries of `moved` for the two trees of one contact
+    velocity: Annotated[Floats, "direction"]
 
 
-def make_step_friction(coordinates: int, contacts: int, tangents: int, tree_size: int) -> StepFriction:
-    """Allocate the scratch; `tree_size`: coordinates of the largest tree."""
-    c, m, width = contacts, tangents, 2 * tree_size
-    shapes: tuple[Any, ...] = ((c * m, width), c * m, c * m, c, c, coordinates, width, m)
-    return StepFriction(np.zeros(c, np.int64), np.zeros((c, 2), np.int64), *map(np.zeros, shapes))
+@kernel
+def trees_of_contact(world, contacts, i, start, at, size):
+    """Return the two trees of a contact, −1 = none or the same; write their first coordinates by `start`, and sizes."""
+    a, b = moving_tree(world, contacts.body_a[i]), moving_tree(world, contacts.body_b[i])
+    trees = (b, -1) if a < 0 else (a, -1 if b == a else b)
+    for side in range(2):
+        t = trees[side]
+        at[side] = start[t] if t >= 0 else 0
+        size[side] = world.tree_stop[t] - world.tree_start[t] if t >= 0 else 0
+    return trees
+
+
+@kernel
+def along_row(work, r, j, v):
+    """Return row j, of contact r, times v."""
+    total, row, half = 0.0, work.rows[j], work.rows.shape[1] // 2
+    for side in range(2):
+        at = work.at[r, side]
+        for k in range(work.size[r, side]):
+            total += row[side * half + k] * v[at + k]
+    return total
+
+
+@kernel
+def add_along_row(work, r, j, factor, out):
+    """out += factor times row j, of contact r."""
+    row, half = work.rows[j], work.rows.shape[1] // 2
+    for side in range(2):
+        at = work.at[r, side]
+        for k in range(work.size[r, side]):
+            out[at + k] += factor * row[side * half + k]
 
 
 @kernel(needs="coulomb")
@@ -58,8 +87,7 @@ def add_step_friction(world, state):
     count = _gather(world, state)
     if count == 0:
         return
-    _start(world, state, count)
-    _sweep(world, state, count)
+    _sweep(f, count)
     factor = passive_factor(f.p[: count * size], f.slip, f.moved)
     for r in range(count):
         i, force = f.contact[r], (0.0, 0.0, 0.0)
@@ -75,10 +103,8 @@ def add_step_friction(world, state):
         state.v[k] += dt * f.moved[k]
     for r in range(count):
         for side in range(2):
-            tree = f.tree[r, side]
-            if tree >= 0:
-                for k in range(world.tree_start[tree], world.tree_stop[tree]):
-                    state.mean_v[k] = state.v[k]
+            for k in range(f.at[r, side], f.at[r, side] + f.size[r, side]):
+                state.mean_v[k] = state.v[k]
 
 
 @kernel
@@ -100,9 +126,7 @@ def _gather(world, state):
             continue
         f.contact[count] = i
         f.radius[count] = friction_of(world, contacts, i) * contacts.normal_force[i] * world.dt
-        first = moving_tree(world, contacts.body_a[i])
-        other = moving_tree(world, contacts.body_b[i])
-        f.tree[count, 0], f.tree[count, 1] = first, -1 if other == first else other
+        trees = trees_of_contact(world, contacts, i, world.tree_start, f.at[count], f.size[count])
         before = contact_before(state, i, begin)
         n, held, square = load(contacts.normal, i), (0.0, 0.0, 0.0), 0.0
         if before >= 0:
@@ -110,8 +134,14 @@ def _gather(world, state):
         for a in range(size):
             j, tangent = count * size + a, tangent_of(n, a, size)
             f.rows[j] = 0.0
-            write_pair_row(world, state, f.tree[count], i, tangent, f.rows[j])
-            f.slip[j] = _whiten_pair_row(world, state, f.tree[count], f.rows[j])
+            write_pair_row(world, state, trees, i, tangent, f.rows[j])
+            f.slip[j] = along_row(f, count, j, state.v)
+            for side in range(2):  # L x = row, tree by tree
+                at, own = f.at[count, side], f.rows[j, side * (f.rows.shape[1] // 2) :]
+                for k in range(f.size[count, side]):
+                    for h in range(k):
+                        own[k] -= state.lower[at + k, at + h] * own[h]
+                    own[k] /= state.lower[at + k, at + k]
             f.p[j] = dot(held, tangent)
             square += f.p[j] * f.p[j]
         if square > f.radius[count] * f.radius[count]:
@@ -123,64 +153,33 @@ def _gather(world, state):
 
 
 @kernel
-def _whiten_pair_row(world, state, trees, row):
-    """Overwrite a row of J by that of J L⁻ᵀ; return J v."""
-    speed = 0.0
-    for side in range(2):
-        if trees[side] >= 0:
-            start, own = world.tree_start[trees[side]], row[side * (row.shape[0] // 2) :]
-            for k in range(world.tree_stop[trees[side]] - start):
-                speed += own[k] * state.v[start + k]
-                for h in range(k):
-                    own[k] -= state.lower[start + k, start + h] * own[h]
-                own[k] /= state.lower[start + k, start + k]
-    return speed
+def _sweep(f, count):
+    """Sweep p, contact by contact, until a sweep changes no velocity by more than STILL; write `moved` for this p.
 
-
-@kernel
-def _start(world, state, count):
-    """Start from the impulses of the step before if they take energy, else from zero; write `moved` for this p."""
-    f, size = state.step_friction, state.step_friction.velocity.shape[0]
+    It starts from the impulses of the step before if they take energy, else from zero.
+    """
+    size, half, still = f.velocity.shape[0], f.local.shape[0] // 2, 0.0
     f.moved[:] = 0.0
     for r in range(count):
-        _carry(world, f, r, False)
         for j in range(r * size, (r + 1) * size):
-            add_multiple(f.local, f.p[j], f.rows[j])
-        _carry(world, f, r, True)
+            still = max(still, STILL * abs(f.slip[j]))
+            add_along_row(f, r, j, f.p[j], f.moved)
     if dot_of(f.p[: count * size], f.slip[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
         f.p[: count * size] = 0.0
         f.moved[:] = 0.0
-
-
-@kernel
-def _carry(world, f, r, back):
-    """Copy the entries of `moved` for the trees of contact r to `local`, or back."""
-    if not back:
-        f.local[:] = 0.0
-    for side in range(2):
-        tree, width = f.tree[r, side], f.local.shape[0] // 2
-        if tree >= 0:
-            for k in range(world.tree_stop[tree] - world.tree_start[tree]):
-                if back:
-                    f.moved[world.tree_start[tree] + k] = f.local[side * width + k]
-                else:
-                    f.local[side * width + k] = f.moved[world.tree_start[tree] + k]
-
-
-@kernel
-def _sweep(world, state, count):
-    """Sweep p, contact by contact, until a sweep changes no velocity by more than STILL; update `moved`."""
-    f, size, fastest = state.step_friction, state.step_friction.velocity.shape[0], 0.0
-    for j in range(count * size):
-        fastest = max(fastest, abs(f.slip[j]))
-    still = STILL * fastest
     for _ in range(SWEEPS):
         fastest = 0.0
         for r in range(count):
-            if f.inertia[r] > 0.0:
-                _carry(world, f, r, False)
-                moves = slide(f.rows, f.slip, f.radius[r], f.inertia[r], f.p, f.local, f.velocity, r * size)
-                _carry(world, f, r, True)
-                fastest = max(fastest, moves)
+            if not f.inertia[r] > 0.0:
+                continue
+            f.local[:] = 0.0
+            for side in range(2):
+                for k in range(f.size[r, side]):
+                    f.local[side * half + k] = f.moved[f.at[r, side] + k]
+            moves = slide(f.rows, f.slip, f.radius[r], f.inertia[r], f.p, f.local, f.velocity, r * size)
+            fastest = max(fastest, moves)
+            for side in range(2):
+                for k in range(f.size[r, side]):
+                    f.moved[f.at[r, side] + k] = f.local[side * half + k]
         if fastest <= still:
             break

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.passive import clamped_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change
 from iapb.double_double import add_product, symmetric_entry
 from iapb.linalg import add_multiple, dot_of, from_whitened, to_momentum, to_whitened, whiten_columns
+from iapb.schema import Floats
 
 UNIT_ROUNDOFF = 2.0**-53
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. The error of
@@ -22,30 +21,23 @@ _NOISE_FACTOR = 8.0  # rounding of a whitened row is below d · ε · κ(L) in a
 
 
 class ImpactWork(NamedTuple):
-    """Scratch of one impact: d coordinates, up to c contacts."""
+    """Scratch of one impact, with up to as many rows as there are contacts, or two for each."""
 
-    columns: np.ndarray  # (d, c) rows of J as columns, then of A, then their residuals
-    rows: np.ndarray  # (d, c) unit rows of A as columns, kept for impulses
-    length: np.ndarray  # (c,) lengths of the rows of A
-    basis: np.ndarray  # (d, d) rows are the orthonormal basis Q
-    triangle: np.ndarray  # (d, d) T of the impulses of least norm
-    closing: np.ndarray  # (c,)
-    size: np.ndarray  # (c,)
-    overlap: np.ndarray  # (c,)
-    u: np.ndarray  # (d,) whitened velocity
-    change: np.ndarray  # (d,) Δu; after an impact L⁻¹ of the generalized impulse
-    v_change: np.ndarray  # (d,) Δv
-    target: np.ndarray  # (d,)
-    deviation: np.ndarray  # (d,)
-    along: np.ndarray  # (d,)
-    shifted: np.ndarray  # (d,)
-
-
-def make_impact_work(coordinates: int, contacts: int) -> ImpactWork:
-    """Allocate the scratch for up to `contacts` rows on `coordinates` generalized velocities."""
-    d, c = coordinates, contacts
-    shapes: tuple[Any, ...] = ((d, c), (d, c), c, (d, d), (d, d), c, c, c, d, d, d, d, d, d, d)
-    return ImpactWork(*map(np.zeros, shapes))
+    columns: Annotated[Floats, "velocity row"]  # rows of J as columns, then of A, then their residuals
+    rows: Annotated[Floats, "velocity row"]  # unit rows of A as columns, kept for impulses
+    length: Annotated[Floats, "row"]  # lengths of the rows of A
+    basis: Annotated[Floats, "velocity velocity"]  # rows are the orthonormal basis Q
+    triangle: Annotated[Floats, "velocity velocity"]  # T of the impulses of least norm
+    closing: Annotated[Floats, "row"]
+    size: Annotated[Floats, "row"]
+    overlap: Annotated[Floats, "row"]
+    u: Annotated[Floats, "velocity"]  # whitened velocity
+    change: Annotated[Floats, "velocity"]  # Δu; after an impact L⁻¹ of the generalized impulse
+    v_change: Annotated[Floats, "velocity"]  # Δv
+    target: Annotated[Floats, "velocity"]
+    deviation: Annotated[Floats, "velocity"]
+    along: Annotated[Floats, "velocity"]
+    shifted: Annotated[Floats, "velocity"]
 
 
 @kernel

@@ -17,9 +17,7 @@ then α = 1 and the impact obeys Coulomb's law.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import apply_change
@@ -27,36 +25,30 @@ from iapb.contact.kernels.projector import add_minimum_norm, minimum_norm_factor
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
 from iapb.linalg import add_multiple, dot_of, from_whitened, orthogonalize
+from iapb.schema import Floats
 
 GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 
 
 class FrictionWork(NamedTuple):
-    """Scratch of the friction of one impact: d coordinates, c contacts, m tangents each (1 planar, 2 spatial)."""
+    """Scratch of the friction of one impact: each row is a contact with 1 (planar) or 2 (spatial) tangents."""
 
-    free: np.ndarray  # (c m, d) tangents' rows of J, then of A, then B
-    normal_part: np.ndarray  # (c m, d) A_t Qᵀ: the removed part, along the basis
-    slip: np.ndarray  # (c m,) tangential velocity after the normal impact [m/s]
-    p: np.ndarray  # (c m,) tangential impulses [N s]
-    inertia: np.ndarray  # (c,) ‖B_i B_iᵀ‖ [1/kg]
-    response: np.ndarray  # (c m,) ∂p_n,i / ∂p_t,i by least norm: effect of a contact's friction on its normal impulse
-    coefficient: np.ndarray  # (c,) μ
-    radius: np.ndarray  # (c,) Coulomb's limit μ p_n [N s]
-    change: np.ndarray  # (c,) change of each limit required by a round
-    sliding: np.ndarray  # (c,) μ; 0 where the frictionless normal impulse pulls
-    without: np.ndarray  # (c,) normal impulses without friction [N s]
-    wanted: np.ndarray  # (c,) normal impulses with friction
-    target: np.ndarray  # (d,) Q Δ_n
-    left: np.ndarray  # (d,)
-    moved: np.ndarray  # (d,) Bᵀ p_t
-    velocity: np.ndarray  # (m,)
-
-
-def make_friction_work(coordinates: int, contacts: int, tangents: int) -> FrictionWork:
-    """Allocate the scratch for up to `contacts` contacts with `tangents` directions each."""
-    d, c, m = coordinates, contacts, tangents
-    shapes: tuple[Any, ...] = ((c * m, d), (c * m, d), c * m, c * m, c, c * m, c, c, c, c, c, c, d, d, d, m)
-    return FrictionWork(*map(np.zeros, shapes))
+    free: Annotated[Floats, "tangent velocity"]  # tangents' rows of J, then of A, then B
+    normal_part: Annotated[Floats, "tangent velocity"]  # A_t Qᵀ: the removed part, along the basis
+    slip: Annotated[Floats, "tangent"]  # tangential velocity after the normal impact [m/s]
+    p: Annotated[Floats, "tangent"]  # tangential impulses [N s]
+    inertia: Annotated[Floats, "row"]  # ‖B_i B_iᵀ‖ [1/kg]
+    response: Annotated[Floats, "tangent"]  # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
+    coefficient: Annotated[Floats, "row"]  # μ
+    radius: Annotated[Floats, "row"]  # Coulomb's limit μ p_n [N s]
+    change: Annotated[Floats, "row"]  # change of each limit required by a round
+    sliding: Annotated[Floats, "row"]  # μ; 0 where the frictionless normal impulse pulls
+    without: Annotated[Floats, "row"]  # normal impulses without friction [N s]
+    wanted: Annotated[Floats, "row"]  # normal impulses with friction
+    target: Annotated[Floats, "velocity"]  # Q Δ_n
+    left: Annotated[Floats, "velocity"]
+    moved: Annotated[Floats, "velocity"]  # Bᵀ p_t
+    velocity: Annotated[Floats, "direction"]
 
 
 @kernel
@@ -224,8 +216,7 @@ def _start(count, rank, work, push, f, d):
     for i in range(count):
         f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
         f.sliding[i], f.radius[i] = f.coefficient[i], 0.0
-    f.wanted[:count] = 0.0  # start from impulses of least norm: an active set loads only a few of redundant contacts
-    _move_normals(count, rank, work, f, True)
+    _move_normals(count, rank, work, f, False)  # an active set loads only a few of redundant contacts
     return True
 
 
@@ -263,7 +254,7 @@ def _move_normals(count, rank, work, f, near):
 @kernel
 def _settle(count, rank, work, f, d, scale, pushes):
     """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET times the scale."""
-    size, speed = f.velocity.shape[0], math.sqrt(dot_of(work.u[:d], work.u[:d]))
+    size, speed, still = f.velocity.shape[0], math.sqrt(dot_of(work.u[:d], work.u[:d])), STILL * scale
     moved = math.inf
     for done in range(ROUNDS):
         defect = _move_normals(count, rank, work, f, pushes)
@@ -273,37 +264,29 @@ def _settle(count, rank, work, f, d, scale, pushes):
                 f.wanted[i] = max(f.wanted[i], 0.0)
             f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.radius[i]
             f.radius[i] = max(0.0, f.radius[i] + step * _stride(f, i, size) * f.change[i])
-        moved = _sweep_tangents(count, d, f, STILL * scale)
+        moved = friction_sweeps(count, d, f, 1, 0.0)
+        if moved > still:
+            friction_sweeps(count, d, f, SWEEPS - 1, SETTLED * moved)
+        for i in range(count):  # an undamped limit that holds p_t would move it on
+            own, change = f.p[i * size : (i + 1) * size], abs(f.change[i])
+            length = math.sqrt(dot_of(own, own))
+            if length >= f.radius[i] - STRIDE * change:
+                moved = max(moved, f.inertia[i] * min(change, length))
         if speed > 0.0:
             moved = max(moved, scale * (defect / speed))
-        if moved <= STILL * scale:
+        if moved <= still:
             return True
     return moved <= MET * scale
 
 
 @kernel
-def _sweep_tangents(count, d, f, still):
-    """Sweep p_t; return the largest change of velocity by the first sweep, or by an undamped limit that holds p_t."""
-    size = f.velocity.shape[0]
-    moved = friction_sweeps(count, d, f, 1, 0.0)
-    if moved > still:
-        friction_sweeps(count, d, f, SWEEPS - 1, SETTLED * moved)
-    for i in range(count):
-        own = f.p[i * size : (i + 1) * size]
-        length, change = math.sqrt(dot_of(own, own)), abs(f.change[i])
-        if length >= f.radius[i] - STRIDE * change:
-            moved = max(moved, f.inertia[i] * min(change, length))
-    return moved
-
-
-@kernel
 def _trim(count, rank, work, f, near):
     """Shorten each contact's p_t that the last round left outside its cone, and update the normal impulses."""
-    size = f.velocity.shape[0]
-    for _ in range(TRIMS):
+    size, largest = f.velocity.shape[0], 0.0
+    for turn in range(TRIMS + 1):
         _move_normals(count, rank, work, f, near)
         within = True
-        for i in range(count):
+        for i in range(count if turn < TRIMS else 0):
             own, limit = f.p[i * size : (i + 1) * size], f.sliding[i] * max(f.wanted[i], 0.0)
             length = math.sqrt(dot_of(own, own))
             if length > limit:
@@ -312,9 +295,6 @@ def _trim(count, rank, work, f, near):
                     own[a] *= limit / length
         if within:
             break
-    else:
-        _move_normals(count, rank, work, f, near)
-    largest = 0.0
     for i in range(count):
         largest = max(largest, f.wanted[i])
     for i in range(count):

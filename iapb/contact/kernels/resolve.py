@@ -8,18 +8,19 @@ of row scale by a power of two changes no bit of the result.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.impact import ImpactWork, factored_impact, make_impact_work, rank_tolerance
-from iapb.contact.kernels.impact_friction import FrictionWork, add_impact_friction, make_friction_work
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
+from iapb.contact.kernels.impact_friction import FrictionWork, add_impact_friction
 from iapb.contact.kernels.passive import gain_enclosure, passive_step
 from iapb.contact.kernels.projector import minimum_norm_impulses
-from iapb.contact.kernels.unilateral import PushWork, make_push_work, poisson_impact
+from iapb.contact.kernels.unilateral import PushWork, poisson_impact
 from iapb.double_double import kinetic_energies
 from iapb.linalg import add_multiple, cholesky, dot_of
+from iapb.schema import Floats, Integers
 
 # |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as given, in which the skew
 # part cancels; the Cholesky factor is that of the symmetric part.
@@ -42,33 +43,23 @@ class Results(NamedTuple):
     generalized_impulse: np.ndarray  # (n, d)
     impulses: np.ndarray  # (n, c)
     tangential: np.ndarray  # (n, c m)
-    ends: np.ndarray  # (n, 2) int64: rank, status
-    numbers: np.ndarray  # (n, 5) energy change, its lower and its upper bound, clamp, share of friction
+    numbers: np.ndarray  # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
 
 
 class ResolveWork(NamedTuple):
-    """Scratch of one whole impact: d coordinates, c contacts."""
+    """Scratch of one whole impact."""
 
-    mass: np.ndarray  # (d, d) scaled, symmetric to rounding
-    lower: np.ndarray  # (d, d) the Cholesky factor of its symmetric part
-    velocity: np.ndarray  # (d,) scaled
-    v_plus: np.ndarray  # (d,) scaled
-    coordinate_exponent: np.ndarray  # s (d,)
-    row_exponent: np.ndarray  # r (c,)
-    size: np.ndarray  # (c,) ratio of the caller's rows to the scaled rows, up to one common factor
-    length: np.ndarray  # (c,)
+    mass: Annotated[Floats, "velocity velocity"]  # scaled, symmetric to rounding
+    lower: Annotated[Floats, "velocity velocity"]  # the Cholesky factor of its symmetric part
+    velocity: Annotated[Floats, "velocity"]  # scaled
+    v_plus: Annotated[Floats, "velocity"]  # scaled
+    coordinate_exponent: Annotated[Integers, "velocity"]  # s
+    row_exponent: Annotated[Integers, "row"]  # r
+    size: Annotated[Floats, "row"]  # ratio of the caller's rows to the scaled rows, up to one common factor
+    length: Annotated[Floats, "row"]
     impact: ImpactWork
     push: PushWork
     friction: FrictionWork
-
-
-def make_resolve_work(coordinates: int, contacts: int, tangents: int) -> ResolveWork:
-    """Allocate the scratch for `contacts` rows on `coordinates` velocities, with `tangents` directions of friction."""
-    d, c = coordinates, contacts
-    return ResolveWork(
-        np.zeros((d, d)), np.zeros((d, d)), np.zeros(d), np.zeros(d), np.zeros(d, np.int64), np.zeros(c, np.int64),
-        np.zeros(c), np.zeros(c), make_impact_work(d, max(1, c)), make_push_work(d, max(1, c)),
-        make_friction_work(d, max(1, c), tangents))
 
 
 @kernel
@@ -81,10 +72,10 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
     tolerance : rank tolerance of the rows; 0 selects the default.  out : `Results`
     """
     n, c, d = jacobians.shape
-    lower, impact = work.lower, work.impact
+    lower, impact, f = work.lower, work.impact, work.friction
     for m in range(n):
         v_plus, momentum, p, p_t = out.velocity[m], out.generalized_impulse[m], out.impulses[m], out.tangential[m]
-        out.ends[m, 1] = REFUSED
+        out.numbers[m, 1] = REFUSED
         sound, k, rounded = scale_impact(masses[m], jacobians[m], velocities[m], tangents is None, work)
         if not sound:
             return m
@@ -93,34 +84,32 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
             rank, clamp = poisson_impact(work.mass, lower, work.velocity, unequal[m], c, clamped, impact, work.push, p,
                                          work.v_plus, momentum)
             if rank < 0:
-                out.ends[m, 1] = NOT_CONVERGED
+                out.numbers[m, 1] = NOT_CONVERGED
                 return m
             status = COMPLETE if clamp >= 1.0 - _UNSOLVED and separates(d, c, impact) else NOT_SOLVED
         else:
             least = tolerance if tolerance > 0.0 else rank_tolerance(lower)
             rank, clamp = factored_impact(work.mass, lower, work.velocity, restitution[m], c, least, budget, clamped,
                                           impact, work.v_plus, momentum)
-            if rank == budget and rank < d:
-                for i in range(c):
-                    status = BUDGET if impact.size[i] > least * least else status
+            for i in range(c if rank == budget and rank < d else 0):
+                status = BUDGET if impact.size[i] > least * least else status
             if tangents is None:
                 least_norm_impulses(d, c, rank, work, p)
             else:
                 for j in range(p_t.shape[0]):
                     for i in range(d):
-                        work.friction.free[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
-                copy_into(work.friction.coefficient[:c], friction[m])
+                        f.free[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
+                copy_into(f.coefficient[:c], friction[m])
                 share, factor, met = add_impact_friction(work.mass, lower, work.velocity, c, rank, impact, work.push,
-                                                         work.friction, p, work.v_plus, momentum)
+                                                         f, p, work.v_plus, momentum)
                 clamp *= factor
                 status = COMPLETE if met else REDUCED
-                copy_into(p_t, work.friction.p)
-        factor = unscale_impact(masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.numbers[m])
-        clamp *= factor
-        if not (finite(v_plus) and finite(momentum) and finite(p) and finite(p_t) and math.isfinite(out.numbers[m, 0])):
+                copy_into(p_t, f.p)
+        clamp *= unscale_impact(masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.numbers[m])
+        if not (finite(v_plus) and finite(momentum) and finite(p) and finite(p_t) and math.isfinite(out.numbers[m, 2])):
             return m
-        out.numbers[m, 3], out.numbers[m, 4] = clamp, share
-        out.ends[m, 0], out.ends[m, 1] = rank, CANCELLED if clamp == 0.0 or rounded and c > 0 else status
+        out.numbers[m, 0], out.numbers[m, 1] = rank, CANCELLED if clamp == 0.0 or rounded and c > 0 else status
+        out.numbers[m, 5], out.numbers[m, 6] = clamp, share
     return n
 
 
@@ -130,7 +119,7 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
 
     Returns whether all is finite and M symmetric and positive definite, k, and whether scaling rounded entries of v.
     """
-    d, c, s, r = velocity.shape[0], jacobian.shape[0], work.coordinate_exponent, work.row_exponent
+    d, s, r = velocity.shape[0], work.coordinate_exponent, work.row_exponent
     for i in range(d):
         if not (mass_matrix[i, i] > 0.0 and math.isfinite(mass_matrix[i, i]) and math.isfinite(velocity[i])):
             return False, 0, False
@@ -153,13 +142,13 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
     for i in range(d):
         rounded = rounded or _LOWEST_EXPONENT // 2 < _exponent(velocity[i]) - s[i] < k - _EXACT
         work.velocity[i] = np.ldexp(velocity[i], -(s[i] + k))
-    for i in range(c):
-        r[i] = -_LOWEST_EXPONENT  # of a row of zeros
+    for i in range(jacobian.shape[0]):
+        r[i] = -_LOWEST_EXPONENT if scales_rows else 0  # the first is that of a row of zeros
         for j in range(d):
             if not math.isfinite(jacobian[i, j]):
                 return False, 0, False
-            r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
-        r[i] = r[i] if scales_rows else 0
+            if scales_rows:
+                r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
         for j in range(d):
             work.impact.columns[j, i] = np.ldexp(jacobian[i, j], r[i] + s[j])
     return True, k, rounded
@@ -213,12 +202,12 @@ def least_norm_impulses(d, count, rank, work, impulses):
 
 
 @kernel
-def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, impulses, tangential, energy):
+def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, impulses, tangential, numbers):
     """Return to the caller's units in place; clamp the step again if this rounding raised the energy.
 
     Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of this clamp.
     """
-    d, s = velocity.shape[0], work.coordinate_exponent
+    d, s, factor = velocity.shape[0], work.coordinate_exponent, 1.0
     for i in range(d):
         v_plus[i] = np.ldexp(work.v_plus[i], s[i] + k)
         momentum[i] = np.ldexp(momentum[i], k - s[i])
@@ -227,8 +216,7 @@ def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, im
     for j in range(tangential.shape[0]):
         tangential[j] = np.ldexp(tangential[j], k)
     if not finite(v_plus):
-        return 1.0
-    factor = 1.0
+        return factor
     lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
     if clamped and not upper <= 0.0:
         step = work.impact.v_change
@@ -237,16 +225,14 @@ def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, im
         factor = passive_step(mass_matrix, velocity, step[:d], 1.0, v_plus)
         for i in range(d):
             work.v_plus[i] = np.ldexp(v_plus[i], -(s[i] + k))
-            momentum[i] *= factor
-        for i in range(impulses.shape[0]):
-            impulses[i] *= factor
-        for j in range(tangential.shape[0]):
-            tangential[j] *= factor
+        for scaled in (momentum, impulses, tangential):
+            for i in range(scaled.shape[0]):
+                scaled[i] *= factor
         lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
     change = np.ldexp(kinetic_energies(work.mass, work.velocity, work.v_plus)[1], 2 * k)
     low, high = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
     change = low if low > change else change
-    energy[0], energy[1], energy[2] = high if high < change else change, low, high
+    numbers[2], numbers[3], numbers[4] = high if high < change else change, low, high
     return factor
 
 
@@ -254,11 +240,9 @@ def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, im
 def _outward(value, exponent, towards):
     """Return value · 2^exponent, rounded one step outwards; a bound that shows no gain (or no loss) still shows it."""
     bound = np.nextafter(np.ldexp(value, exponent), towards)
-    if towards > 0.0 and value <= 0.0:
-        return min(bound, 0.0)
-    if towards < 0.0 and value >= 0.0:
-        return max(bound, 0.0)
-    return bound
+    if towards > 0.0:
+        return min(bound, 0.0) if value <= 0.0 else bound
+    return max(bound, 0.0) if value >= 0.0 else bound
 
 
 @kernel

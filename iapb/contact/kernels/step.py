@@ -19,6 +19,7 @@ from iapb.contact.kernels.rows import contact_velocities, friction_of
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.linalg import (
     add,
+    add_multiple,
     cholesky,
     cholesky_tree_blocks,
     load,
@@ -74,24 +75,19 @@ def advance(world, state, applied):
 @kernel
 def contact_state(state, tool_tree):
     """Return the state of the tool's group; without a tool: COLLIDING if any tree collides, RESTING if any rests."""
-    if tool_tree >= 0:
-        return state.state_of_tree[tool_tree]
     found = FREE
     for t in range(state.state_of_tree.shape[0]):
-        if state.state_of_tree[t] == COLLIDING:
-            return COLLIDING
-        if state.state_of_tree[t] == RESTING:
-            found = RESTING
+        if tool_tree in (-1, t) and (found == FREE or state.state_of_tree[t] == COLLIDING):
+            found = state.state_of_tree[t]
     return found
 
 
 @kernel
 def clear(state):
     """Set the forces and impulses of the step before to zero."""
-    for k in range(state.v.shape[0]):
-        state.penalty_force[k] = 0.0
-        state.friction_force[k] = 0.0
-        state.impulse[k] = 0.0
+    state.penalty_force[:] = 0.0
+    state.friction_force[:] = 0.0
+    state.impulse[:] = 0.0
     state.impacts.logged[0] = 0
 
 
@@ -99,39 +95,38 @@ def clear(state):
 def locate(world, state):
     """Place all bodies at q; update M and its factor if they depend on q. Return False if M is not definite."""
     forward_kinematics(world.mechanism, state.q, state.body)
-    if not world.switches.varying_inertia or (world.conserving and is_located(state)):
-        return True
-    if world.conserving:
+    stale = world.switches.varying_inertia
+    if world.conserving and stale:
+        stale = False
+        for i in range(state.q.shape[0]):
+            stale = stale or state.q[i] != state.located_q[i]
         copy_into(state.located_q, state.q)
+    if not stale:
+        return True
     mass_matrix(world.mechanism, state.body, state.mass_matrix)
     return cholesky_tree_blocks(state.mass_matrix, world.tree_start, world.tree_stop, state.lower) == 0
 
 
 @kernel
-def is_located(state):
-    """Return whether M and its factor are those of q already."""
-    for i in range(state.q.shape[0]):  # noqa: SIM110 - a kernel has no generators
-        if state.q[i] != state.located_q[i]:
-            return False
-    return True
-
-
-@kernel
 def find_contacts(world, state):
     """Find the contacts (section III): cluster them, mark new ones, classify groups; return how many, -1: too many."""
-    remember(state)
-    count = present_contacts(world, state, state.contacts)
+    now, before = state.contacts, state.previous
+    for i in range(state.contact_count[0]):  # `mark_new` and friction compare with those of the last step
+        copy_contact(before, i, now, i)
+        before.normal_force[i] = now.normal_force[i]
+        store(before.friction_force, i, load(now.friction_force, i))
+    state.contact_count[1] = state.contact_count[0]
+    count = present_contacts(world, state, now)
     if count < 0:
         return count
     state.contact_count[0] = count
     state.contact_impulse[:count] = 0.0
-    contact_velocities(world.mechanism, state.body, state.v, state.contacts, count)
-    mark_new(state.contacts, count, state.previous, state.contact_count[1], world.coherence_distance)
+    contact_velocities(world.mechanism, state.body, state.v, now, count)
+    mark_new(now, count, before, state.contact_count[1], world.coherence_distance)
     classify(world, state, count)
-    if not world.switches.impulses:
-        for t in range(state.state_of_tree.shape[0]):
-            if state.state_of_tree[t] == COLLIDING:
-                state.state_of_tree[t] = RESTING
+    for t in range(0 if world.switches.impulses else state.state_of_tree.shape[0]):
+        if state.state_of_tree[t] == COLLIDING:
+            state.state_of_tree[t] = RESTING
     return count
 
 
@@ -156,36 +151,27 @@ def present_contacts(world, state, contacts):
 
 
 @kernel
-def remember(state):
-    """Copy the contacts and forces of the last step to `previous`: `mark_new` and friction compare with them."""
-    now, before = state.contacts, state.previous
-    for i in range(state.contact_count[0]):
-        copy_contact(before, i, now, i)
-        before.normal_force[i] = now.normal_force[i]
-        store(before.friction_force, i, load(now.friction_force, i))
-    state.contact_count[1] = state.contact_count[0]
-
-
-@kernel
 def move(world, state, applied):
     """Integrate (7) over Δt: forces at each stage, new velocity, new configuration."""
     copy_into(state.start_q, state.q)
-    for k in range(state.v.shape[0]):
-        state.start_v[k] = state.v[k]
-        state.mean_v[k] = 0.0
-        state.mean_acceleration[k] = 0.0
+    copy_into(state.start_v, state.v)
+    state.mean_v[:] = 0.0
+    state.mean_acceleration[:] = 0.0
     for stage in range(world.stage_weight.shape[0]):
-        if stage > 0 and not go_to_stage(world, state, world.dt * world.stage_fraction[stage]):
-            return NOT_POSITIVE_DEFINITE
+        weight, time = world.stage_weight[stage], world.dt * world.stage_fraction[stage]
+        if stage > 0:  # with velocity and acceleration of the stage before
+            integrate(world.mechanism, state.start_q, state.v, time, state.q)
+            copy_into(state.v, state.start_v)
+            add_multiple(state.v, time, state.acceleration)
+            if not locate(world, state):
+                return NOT_POSITIVE_DEFINITE
         accelerate(world, state, applied, stage)
-        weight = world.stage_weight[stage]
-        for k in range(state.v.shape[0]):
-            state.mean_v[k] += weight * state.v[k]
-            state.mean_acceleration[k] += weight * state.acceleration[k]
-            state.penalty_force[k] += weight * state.stage_penalty[k]
-            state.friction_force[k] += weight * state.stage_friction[k]
-    for k in range(state.v.shape[0]):
-        state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
+        add_multiple(state.mean_v, weight, state.v)
+        add_multiple(state.mean_acceleration, weight, state.acceleration)
+        add_multiple(state.penalty_force, weight, state.stage_penalty)
+        add_multiple(state.friction_force, weight, state.stage_friction)
+    copy_into(state.v, state.start_v)
+    add_multiple(state.v, world.dt, state.mean_acceleration)
     touches = world.switches.contacts and (world.coulomb or world.implicit)
     if (touches or world.switches.joint_damping) and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
@@ -204,22 +190,21 @@ def move(world, state, applied):
 @kernel
 def implicit_forces(world, state, touches):
     """Apply joint damping and contact, from the state at the start of the step. Return False if M is not definite."""
+    damped = world.switches.joint_damping
     if world.stage_weight.shape[0] > 1:
         copy_into(state.q, state.start_q)
         if not locate(world, state):
             return False
-    if world.switches.joint_damping and not damp_joints(world, state):
+    if damped and not damp_joints(world, state):
         return False
     if touches and world.implicit:
         rest_implicitly(world, state, world.coulomb)
-        if world.switches.joint_damping:
-            for k in range(state.v.shape[0]):
-                state.acceleration[k] = -world.joint_damping[k] * state.v[k]
+        for k in range(state.v.shape[0] if damped else 0):
+            state.acceleration[k] = -world.joint_damping[k] * state.v[k]
     elif touches:
         add_step_friction(world, state)
-    if world.switches.joint_damping:
-        for k in range(state.v.shape[0]):
-            state.friction_force[k] += state.acceleration[k]
+    if damped:
+        add_multiple(state.friction_force, 1.0, state.acceleration)
     return True
 
 
@@ -230,17 +215,16 @@ def drift(world, state):
     if not (free.turning and world.switches.velocity_terms):
         integrate(m, state.start_q, state.v, world.dt, state.q)
     else:
-        parts = 1
+        parts = 0
         if free.linked:
             parts = parts_of_linkages(m, free, world.tree_start, world.tree_stop, state.v, world.dt)
             coriolis(world, state)
         move_simple_trees(m, free, world.tree_of_body, state.q, state.v, world.dt)
-        if free.linked:
-            for part in range(parts):
-                if part > 0:
-                    coriolis(world, state)
-                if not swing(world, state, world.dt / parts):
-                    return False
+        for part in range(parts):
+            if part > 0:
+                coriolis(world, state)
+            if not swing(world, state, world.dt / parts):
+                return False
     if world.switches.gravity:
         pull_free_trees(world, state)
     return True
@@ -268,8 +252,7 @@ def swing(world, state, h):
             center, mass = center_of(m, state.body, world.tree_of_body, t)
             path = scale(h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, t, p))
             p[6], p[7], p[8] = add(center, path)
-            for k in range(start, stop):
-                state.v[k] += 0.5 * h * a[k]
+            add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
     for b in range(m.kind.shape[0]):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
             integrate_body(m, b, state.q, state.v, h, state.q)
@@ -311,10 +294,16 @@ def pull_free_trees(world, state):
     forward_kinematics(world.mechanism, state.q, state.body)
     gravity(world.mechanism, state.body, world.gravity, state.bias)
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.bias, state.bias)
+    add_to_free_trees(world, state, state.v, -0.5 * world.dt)
+
+
+@kernel
+def add_to_free_trees(world, state, vector, factor):
+    """Do vector += factor · `bias` for the trees without contact."""
     for t in range(world.tree_start.shape[0]):
         if state.state_of_tree[t] == FREE:
-            for k in range(world.tree_start[t], world.tree_stop[t]):
-                state.v[k] -= 0.5 * world.dt * state.bias[k]
+            start, stop = world.tree_start[t], world.tree_stop[t]
+            add_multiple(vector[start:stop], factor, state.bias[start:stop])
 
 
 @kernel(needs="joint_damping", otherwise=True)
@@ -348,15 +337,6 @@ def damp_joints(world, state):
 
 
 @kernel
-def go_to_stage(world, state, time):
-    """Move to a stage: from the start of the step, `time` [s] with velocity and acceleration of the stage before."""
-    integrate(world.mechanism, state.start_q, state.v, time, state.q)
-    for k in range(state.v.shape[0]):
-        state.v[k] = state.start_v[k] + time * state.acceleration[k]
-    return locate(world, state)
-
-
-@kernel
 def accelerate(world, state, applied, stage):
     """Solve (7), M a = applied + penalty + friction − B − G, at the present stage."""
     rest(world, state, stage)
@@ -365,26 +345,20 @@ def accelerate(world, state, applied, stage):
         a[k] = applied[k] + state.stage_penalty[k] + state.stage_friction[k]
     if world.switches.gravity:
         gravity(world.mechanism, state.body, world.gravity, state.bias)
-        for k in range(a.shape[0]):
-            a[k] -= state.bias[k]
+        add_multiple(a, -1.0, state.bias)
         if world.conserving:
-            for t in range(world.tree_start.shape[0]):
-                if state.state_of_tree[t] == FREE:
-                    for k in range(world.tree_start[t], world.tree_stop[t]):
-                        a[k] += 0.5 * state.bias[k]
+            add_to_free_trees(world, state, a, 0.5)
     if world.switches.velocity_terms and not world.conserving:
         bias(world.mechanism, state.body, state.v, state.bias)
-        for k in range(a.shape[0]):
-            a[k] -= state.bias[k]
+        add_multiple(a, -1.0, state.bias)
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, a, a)
 
 
 @kernel
 def rest(world, state, stage):
     """Write the forces (4)-(6) at the contacts of groups that do not collide; in a collision the impulse acts."""
-    for k in range(state.v.shape[0]):
-        state.stage_penalty[k] = 0.0
-        state.stage_friction[k] = 0.0
+    state.stage_penalty[:] = 0.0
+    state.stage_friction[:] = 0.0
     if not world.switches.contacts or world.implicit:
         return
     contacts, count = state.contacts, state.contact_count[0]
@@ -394,8 +368,7 @@ def rest(world, state, stage):
         contact_velocities(world.mechanism, state.body, state.v, contacts, count)
     for i in range(count):
         contacts.normal_force[i] = 0.0
-        for axis in range(3):
-            contacts.friction_force[i, axis] = 0.0
+        store(contacts.friction_force, i, (0.0, 0.0, 0.0))
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         if group >= 0 and state.state_of_tree[group] != COLLIDING:
             friction = 0.0 if world.coulomb else friction_of(world, contacts, i)

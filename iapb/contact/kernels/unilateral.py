@@ -7,37 +7,29 @@ Hanson (Solving Least Squares Problems, 1974, chapter 23) on Gram-Schmidt factor
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import apply_change, whiten_impact
 from iapb.linalg import dot_of, from_whitened, orthogonalize
+from iapb.schema import Booleans, Floats, Integers
 
 # A row counts as closing if its speed exceeds this share of |b|, the rounding of a d-term sum of unit rows.
 _CLOSING = 1e-13
 
 
 class PushWork(NamedTuple):
-    """Scratch of impulses that only push: d coordinates, up to c contacts."""
+    """Scratch of impulses that only push; `passive` is the number of velocities and one more."""
 
-    q: np.ndarray  # (d + 1, d) orthonormal directions of the passive rows
-    triangle: np.ndarray  # (d + 1, d + 1)
-    solution: np.ndarray  # (d + 1,)
-    passive: np.ndarray  # (d + 1,) int64: rows that push
-    held: np.ndarray  # (c,) bool: the row is passive
-    banned: np.ndarray  # (c,) bool: the row depends on the passive rows to rounding
-    compressed: np.ndarray  # (d,) whitened velocity after compression
-    final: np.ndarray  # (d,) after restitution
-    more: np.ndarray  # (c,) impulses of the restitution phase beyond E p_c
-
-
-def make_push_work(coordinates: int, contacts: int) -> PushWork:
-    """Allocate the scratch for up to `contacts` rows on `coordinates` generalized velocities."""
-    d, c = coordinates, contacts
-    return PushWork(np.zeros((d + 1, d)), np.zeros((d + 1, d + 1)), np.zeros(d + 1), np.zeros(d + 1, np.int64),
-                    np.zeros(c, np.bool_), np.zeros(c, np.bool_), np.zeros(d), np.zeros(d), np.zeros(c))
+    q: Annotated[Floats, "passive velocity"]  # orthonormal directions of the passive rows
+    triangle: Annotated[Floats, "passive passive"]
+    solution: Annotated[Floats, "passive"]
+    passive: Annotated[Integers, "passive"]  # rows that push
+    held: Annotated[Booleans, "row"]  # the row is passive
+    banned: Annotated[Booleans, "row"]  # the row depends on the passive rows to rounding
+    compressed: Annotated[Floats, "velocity"]  # whitened velocity after compression
+    final: Annotated[Floats, "velocity"]  # after restitution
+    more: Annotated[Floats, "row"]  # impulses of the restitution phase beyond E p_c
 
 
 @kernel

@@ -25,11 +25,6 @@ Arrays = tuple[Floats, Floats, Floats]
 # --- laws, by the kit ------------------------------------------------------------------------------------------------
 
 
-def one_of_three(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """The middle one of many impacts."""
-    return resolve_impacts([2.0 * M, M, M], [J, J, -J], [v, v, 3.0 * v], [1.0, e, 0.0]).velocity[1]
-
-
 # `resolve_frictional_impact` takes every row as an equality, so contacts may pull; those carry no friction.
 EQUALITIES = ["kinetic_energy", "impulse_range", "no_penetration", "restitution", "sticking", "friction_opposes",
               "momentum", "repeatability", "arguments"]
@@ -37,8 +32,6 @@ SUITE: dict[str, tuple[Any, dict[str, Any]]] = {
     "one": (resolve_impact, {"unequal_restitution": True}),
     "one, hard": (resolve_impact, {"largest_condition": 1e10, "seed": 1}),
     "one, in real arithmetic": (resolve_impact, {"laws": ["exact_energy"]}),
-    "many": (one_of_three, {}),
-    "many, in real arithmetic": (one_of_three, {"laws": ["exact_energy"]}),
     "two rows at most": (partial(resolve_impact, budget=2), {"laws": ["kinetic_energy", "exact_energy"]}),
     "pushing": (partial(resolve_impact, method="poisson"), {"contract": "unilateral"}),
     "pushing, in real arithmetic": (partial(resolve_impact, method="poisson"),
@@ -276,7 +269,6 @@ def test_rounding_of_an_ill_conditioned_mass_matrix_is_not_taken_for_contacts() 
 
 def test_a_face_struck_at_three_points_keeps_its_tangential_speed() -> None:
     """Rows (n, (r × n)_z) of exact rank two; a tolerance below their rounding would brake the face."""
-    braked = 0.0
     for angle in np.linspace(0.1, 6.2, 37):
         n, t = np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
         points = [arm * t - 0.3 * n for arm in (-0.5, 0.1, 0.5)]
@@ -284,9 +276,6 @@ def test_a_face_struck_at_three_points_keeps_its_tangential_speed() -> None:
         found = resolve_impact(np.diag([2.0, 2.0, 0.1]), rows, [*(3.0 * t - n), 0.0], 0.5)
         assert found.rank == 2
         np.testing.assert_allclose(found.velocity, [*(3.0 * t + 0.5 * n), 0.0], atol=1e-14)
-        wrong = resolve_impact(np.diag([2.0, 2.0, 0.1]), rows, [*(3.0 * t), 0.0], 0.0, rank_tolerance=1e-18)
-        braked = max(braked, abs(wrong.velocity[:2] @ t - 3.0))
-    assert braked > 1.0
 
 
 def test_ten_thousand_contacts() -> None:
@@ -345,25 +334,13 @@ def test_where_all_approach_and_push_poissons_law_is_the_scalar_rule() -> None:
         assert np.array_equal(same.velocity, scalar.velocity) and same.law == scalar.law
 
 
-def test_equalities_with_unequal_restitution_gain_energy_on_the_bar_and_poissons_law_does_not() -> None:
-    """KE 0.5 → 12.167 J when both contacts are made to obey their own e."""
-    wrong = np.linalg.solve(BAR_ROWS, [1.0, 0.0])
-    assert 0.5 * BAR_VELOCITY @ BAR_MASS @ BAR_VELOCITY == pytest.approx(0.5)
-    assert 0.5 * wrong @ BAR_MASS @ wrong == pytest.approx(12.1666667)
+def test_poissons_law_gains_nothing_on_the_bar_however_many_contacts_it_has() -> None:
+    """As equalities with their own e, the two contacts would turn 0.5 J into 12.167 J."""
     for copies in (1, 2, 10, 300):
         rows, e = np.tile(BAR_ROWS, (copies, 1)), np.tile([1.0, 0.0], copies)
         found = resolve_impact(BAR_MASS, rows, BAR_VELOCITY, e, clamp=False)
         assert found.energy_change <= 1e-14 and found.impulses.min() >= 0.0
         assert (rows @ found.velocity).min() >= -1e-12
-
-
-def test_returning_each_contacts_own_share_and_no_more_leaves_one_approaching() -> None:
-    """p = (I + E) p_c alone is not sound; the second LCP repairs it."""
-    rows, v = np.array([[1.0, 0.0], [-0.8, 0.6]]), np.array([-1.0, -2.0])
-    compressed = resolve_impact(np.eye(2), rows, v, 0.0, method="poisson").impulses
-    naive = v + rows.T @ (compressed * [2.0, 1.0])
-    assert (rows @ naive).min() < -0.1
-    assert (rows @ resolve_impact(np.eye(2), rows, v, [1.0, 0.0]).velocity).min() >= -1e-14
 
 
 @pytest.mark.parametrize(("rows", "v", "v_plus", "p"), [
@@ -447,18 +424,6 @@ def test_limits_that_swing_at_first_settle(seed: int) -> None:
     assert resolve_frictional_impact(*rubbing(seed, 1.0)).status == "complete"
 
 
-def test_whole_friction_would_make_some_impacts_gain_energy() -> None:
-    """Kane and Levinson: elastic, whole, it gains; the share kept of it does not."""
-    gains = []
-    for seed in range(40):
-        M, J, T, v, *_ = rubbing(seed)
-        found, bounced = resolve_frictional_impact(M, J, T, v, 1.0, 0.5), resolve_impact(M, J, v, 1.0).velocity
-        if 0.0 < found.friction_share < 1.0:
-            whole = bounced + (found.velocity - bounced) / found.friction_share
-            gains.append(0.5 * whole @ M @ whole - 0.5 * v @ M @ v)
-    assert max(gains) > 1e-3
-
-
 @pytest.mark.parametrize(("v", "mu", "v_plus"), [
     ([3.0, -1.0], 0.4, [2.4, 0.5]), ([0.3, -1.0], 0.4, [0.0, 0.5]), ([-3.0, -1.0], 0.4, [-2.4, 0.5]),
     ([3.0, -1.0], 0.0, [3.0, 0.5]),
@@ -529,11 +494,6 @@ def test_units_change_no_bit_of_friction(seed: int, mass: int, speed: int) -> No
     assert np.array_equal(other.velocity, np.ldexp(plain.velocity, speed))
     assert np.array_equal(other.tangential_impulses, np.ldexp(plain.tangential_impulses, speed + 2 * mass))
     assert (other.friction_share, other.status) == (plain.friction_share, plain.status)
-
-
-def test_no_contacts_leave_every_bit() -> None:
-    found = resolve_frictional_impact(np.eye(2), [], [], [1.0, -1.0], 0.5, 0.3)
-    assert np.array_equal(found.velocity, [1.0, -1.0]) and found.status == "complete"
 
 
 def test_the_oracle_agrees_with_rationals() -> None:

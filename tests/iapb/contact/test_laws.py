@@ -114,15 +114,6 @@ def test_equal_restitution_changes_no_bit_wherever_it_is_written(e: float) -> No
         assert np.array_equal(own.q, plain.q) and np.array_equal(own.impacts.impulse, plain.impacts.impulse)
 
 
-def test_an_impact_of_contacts_alike_is_the_scalar_rule_though_others_differ() -> None:
-    """The first collision meets one wall only: bit for bit that wall's restitution."""
-    values = dict(zip((wall.name for wall in PEG.walls), (0.2, 0.8), strict=True))
-    mixed = simulate(PEG.with_values({f"walls.{name}.restitution": e for name, e in values.items()}), steps=400)
-    alike = [simulate(PEG.with_values({"contact.restitution": e}), steps=400) for e in values.values()]
-    first = mixed.impacts.step[0] + 2
-    assert any(np.array_equal(mixed.v[:first], run.v[:first]) for run in alike)
-
-
 def test_friction_in_impacts_without_friction_changes_no_bit_and_is_the_scenes_choice() -> None:
     law, scene = ImpulseAugmented(friction_in_impacts=True), BOX.with_values({"contact.friction": 0})
     assert np.array_equal(simulate(scene, law).q, simulate(scene).q)

@@ -157,13 +157,3 @@ def test_chosen_stiffness_lets_a_stack_sag_by_less_than_a_tenth_of_a_millimetre(
               for k, m in enumerate((1e-3, 1.0, 1000.0))]
     run = simulate(scene_of(bodies, [FLOOR], gravity=[0, -9.81], duration=1.0))
     assert -1e-4 < run.contacts.gap.min() < 0.0 and not run.distrust and run.remarks
-
-
-def test_a_pulling_contact_of_5_as_printed_gets_no_friction_and_the_clamp_cuts_it() -> None:
-    """Thrown upwards out of the floor, sliding: −K s − B v_n < 0."""
-    for penalty, pulls in (("printed", True), ("clamped", False)):
-        scene = on_slope(0.0, 0.5, 0.3, forces="paper", penalty=penalty, friction_law="regularised", damping=500.0)
-        run = simulate(scene.with_values({"bodies.box.velocity": [0.3, 1.0, 0.0]}), Penalty(), steps=1)
-        force = run.contacts.normal_force
-        assert len(force) == 2 and ((force < 0.0) == pulls).all() and (pulls or not force.any())
-        assert not run.contacts.friction_force.any()

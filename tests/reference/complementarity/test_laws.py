@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from iapb import resolve_impact
 from iapb.compiled import block
-from iapb.contact.kernels.impact import make_impact_work
+from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.resolve import separates
 from iapb.errors import ArgumentError, SolverError
+from iapb.schema import zeros_of
 from reference.complementarity import ImpactProblem
 from reference.complementarity.adhesion import ADHESIVE, ARTEFACT, NONE, adhesion, nonnegative_impulse
 from reference.complementarity.laws import newton_equality, newton_lcp, per_body_rows, poisson
@@ -167,7 +168,7 @@ def test_the_engines_pushing_method_is_the_newton_lcp(seed: int, e: float) -> No
 
 @pytest.mark.parametrize(("closing", "separate"), [(1.1e-6, False), (0.9e-6, True)])
 def test_a_contact_left_closing_is_noticed_from_a_millionth_of_the_speed_on(closing: float, separate: bool) -> None:
-    work = make_impact_work(2, 1)
+    work = zeros_of(ImpactWork, velocity=2, row=1)
     work.rows[:, 0], work.u[:], work.change[:] = (1.0, 0.0), (-1.0, 0.0), (1.0 - closing, 0.0)
     assert separates(2, 1, block(work)) == separate
 

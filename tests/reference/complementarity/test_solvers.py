@@ -101,9 +101,9 @@ def test_a_problem_without_solution_is_solved_by_nobody_and_one_without_contacts
 
 
 def test_two_sided_rows_are_met_by_all_that_take_them() -> None:
-    """A joint and a contact on one mass: the joint holds with a negative impulse, the contact stays open."""
+    """A joint and a contact on one mass: the joint holds with a negative impulse, e or not; the contact stays open."""
     rows = np.array([[1.0, 0.0], [0.6, 0.8]])
-    joint = ImpactProblem.from_delassus(rows @ rows.T, rows @ [1.0, 0.5], bilateral=[True, False])
+    joint = ImpactProblem.from_delassus(rows @ rows.T, rows @ [1.0, 0.5], 0.5, bilateral=[True, False])
     taking = [name for name in installed(solver_names(joint)) if SOLVERS[name].bilateral]
     for solution in (solve(joint, name) for name in taking):
         assert solution.solved(1e-8), (solution.solver, solution.note, solution.residuals)
