@@ -221,17 +221,6 @@ def _start(count, rank, work, push, f, d):
 
 
 @kernel
-def _stride(f, i, size):
-    """Return the factor 1/(1 − μ ∂p_n/∂p_t) on a limit's change: Newton's step for a single sliding contact."""
-    own = f.p[i * size : (i + 1) * size]
-    length = math.sqrt(dot_of(own, own))
-    if length == 0.0 or length < AT_LIMIT * f.radius[i]:
-        return 1.0
-    gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
-    return 1.0 / max(1.0 - gain, 1.0 / STRIDE)
-
-
-@kernel
 def _move_normals(count, rank, work, f, near):
     """Move `f.wanted` to the nearest normal impulses consistent with p_t, or those of least norm; return the defect."""
     left, defect = f.left[:rank], 0.0
@@ -262,8 +251,13 @@ def _settle(count, rank, work, f, d, scale, pushes):
         for i in range(count):
             if pushes:
                 f.wanted[i] = max(f.wanted[i], 0.0)
+            own, stride = f.p[i * size : (i + 1) * size], 1.0
+            length = math.sqrt(dot_of(own, own))
+            if length > 0.0 and length >= AT_LIMIT * f.radius[i]:  # Newton's step for a single sliding contact
+                gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
+                stride = 1.0 / max(1.0 - gain, 1.0 / STRIDE)
             f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.radius[i]
-            f.radius[i] = max(0.0, f.radius[i] + step * _stride(f, i, size) * f.change[i])
+            f.radius[i] = max(0.0, f.radius[i] + step * stride * f.change[i])
         moved = friction_sweeps(count, d, f, 1, 0.0)
         if moved > still:
             friction_sweeps(count, d, f, SWEEPS - 1, SETTLED * moved)

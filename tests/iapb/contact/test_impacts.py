@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from iapb import resolve_frictional_impact, resolve_impact, resolve_impacts
 from reference.exact import exact_impact, relative_energy_gain
-from tests.iapb.contact.paper import Floats, breach_of_coulomb, impact, poisson
+from tests.iapb.contact.paper import Floats, breach_of_coulomb, poisson
 from verification import check_passivity
 
 EPS = 2.0**-52
@@ -248,15 +248,6 @@ def test_an_ill_conditioned_elastic_impact_is_exact_for_the_mass_matrix_itself(s
         np.testing.assert_allclose(told, momentum, atol=1e-8 * np.abs(momentum).max())
 
 
-def test_without_the_clamp_rounding_gains_energy_and_with_it_nothing_is_lost_but_rounding() -> None:
-    gains: dict[bool, list[float]] = {True: [], False: []}
-    for seed in range(20):
-        for clamp, of in gains.items():
-            M, J, v = light_direction(2, seed)
-            of.append(relative_energy_gain(M, v, resolve_impact(M, J, v, 1.0, clamp=clamp).velocity))
-    assert max(gains[False]) > 0.0 >= max(gains[True]) and min(gains[True]) > -100 * EPS
-
-
 def test_rounding_of_an_ill_conditioned_mass_matrix_is_not_taken_for_contacts() -> None:
     """Rank three by construction, κ(M) = 1e12: whitening leaves noise of about ε κ(L) in dependent rows."""
     for seed in range(20):
@@ -276,16 +267,6 @@ def test_a_face_struck_at_three_points_keeps_its_tangential_speed() -> None:
         found = resolve_impact(np.diag([2.0, 2.0, 0.1]), rows, [*(3.0 * t - n), 0.0], 0.5)
         assert found.rank == 2
         np.testing.assert_allclose(found.velocity, [*(3.0 * t + 0.5 * n), 0.0], atol=1e-14)
-
-
-def test_ten_thousand_contacts() -> None:
-    rng = np.random.default_rng(7)
-    M, _, v = problem(7, d=6)
-    rows = rng.normal(size=(10_000, 3)) @ rng.normal(size=(3, 6))
-    found = resolve_impact(M, rows, v, 0.9)
-    assert found.rank == 3
-    assert np.abs(rows @ found.velocity + 0.9 * (rows @ v)).max() <= 1e-12 * np.abs(rows).max()
-    np.testing.assert_allclose(rows.T @ found.impulses, M @ (found.velocity - v), atol=1e-11)
 
 
 def test_a_plastic_blow_to_the_straight_arm_takes_what_the_paper_says() -> None:
@@ -494,11 +475,3 @@ def test_units_change_no_bit_of_friction(seed: int, mass: int, speed: int) -> No
     assert np.array_equal(other.velocity, np.ldexp(plain.velocity, speed))
     assert np.array_equal(other.tangential_impulses, np.ldexp(plain.tangential_impulses, speed + 2 * mass))
     assert (other.friction_share, other.status) == (plain.friction_share, plain.status)
-
-
-def test_the_oracle_agrees_with_rationals() -> None:
-    for seed in range(10):
-        M, J, v = problem(seed)
-        v_plus, p = impact(M, np.vstack((J, J[0])), v, 0.5)
-        np.testing.assert_allclose(v_plus, exact_impact(M, J, v, 0.5).rounded_velocity, atol=1e-11)
-        np.testing.assert_allclose(M @ (v_plus - v), np.vstack((J, J[0])).T @ p, atol=1e-10)
