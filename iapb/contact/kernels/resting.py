@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.rows import add_body_row
+from iapb.contact.kernels.rows import add_body_row, friction_of
 from iapb.linalg import dot, load, scale, store
 from iapb.mechanics.kernels.kinematics import add_point_force
 
@@ -32,32 +32,30 @@ def friction_share(normal_force, speed, friction, friction_velocity):
 
 
 @kernel
-def resting_force(m, w, contacts, i, stiffness, damping, clamped, friction, friction_velocity, penalty, drag):
-    """Add the forces of contact i, if its gap <= 0, to `penalty` and `drag` (d,), generalized forces Jᵀ F.
+def resting_force(world, state, contacts, i):
+    """Add the forces (4) of contact i, if its gap <= 0, to those of the stage, as generalized forces Jᵀ F.
 
-    m, w : mechanism arrays and workspace at the current configuration
     contacts : velocities up to date (`contact_velocities`); normal_force and friction_force are written
-    stiffness K [N/m], damping B [N s/m], friction μ, friction_velocity v_threshold [m/s]
     """
-    contacts.normal_force[i] = 0.0
-    store(contacts.friction_force, i, (0.0, 0.0, 0.0))
     if contacts.gap[i] > 0.0:
         return
-    force = normal_force(contacts.gap[i], contacts.normal_velocity[i], stiffness, damping, clamped)
+    force = normal_force(contacts.gap[i], contacts.normal_velocity[i], world.stiffness, world.damping, world.clamped)
     contacts.normal_force[i] = force
     x, n = load(contacts.point, i), load(contacts.normal, i)
-    add_body_row(m, w, contacts.body_a[i], x, n, force, penalty)
-    add_body_row(m, w, contacts.body_b[i], x, n, -force, penalty)
+    add_body_row(world.mechanism, state.body, contacts.body_a[i], x, n, force, state.stage_penalty)
+    add_body_row(world.mechanism, state.body, contacts.body_b[i], x, n, -force, state.stage_penalty)
+    friction = 0.0 if world.coulomb else friction_of(world, contacts, i)
     if friction != 0.0:
-        add_friction(m, w, contacts, i, friction, friction_velocity, drag)
+        add_friction(world, state, contacts, i, friction)
 
 
 @kernel
-def add_friction(m, w, contacts, i, friction, friction_velocity, drag):
-    """Add Jᵀ F_f to `drag` (d,): friction (6) of contact i, opposed to the tangential velocity."""
+def add_friction(world, state, contacts, i, friction):
+    """Add Jᵀ F_f to the friction of the stage: (6) at contact i, opposed to the tangential velocity."""
     x, tangential = load(contacts.point, i), load(contacts.tangential_velocity, i)
     speed = math.sqrt(dot(tangential, tangential))
-    force = scale(friction_share(contacts.normal_force[i], speed, friction, friction_velocity), tangential)
+    share = friction_share(contacts.normal_force[i], speed, friction, world.friction_velocity)
+    force = scale(share, tangential)
     store(contacts.friction_force, i, force)
-    add_point_force(m, w, contacts.body_a[i], x, force, drag)
-    add_point_force(m, w, contacts.body_b[i], x, scale(-1.0, force), drag)
+    add_point_force(world.mechanism, state.body, contacts.body_a[i], x, force, state.stage_friction)
+    add_point_force(world.mechanism, state.body, contacts.body_b[i], x, scale(-1.0, force), state.stage_friction)

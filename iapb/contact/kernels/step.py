@@ -15,7 +15,7 @@ from iapb.contact.kernels.implicit import rest_implicitly
 from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
-from iapb.contact.kernels.rows import contact_velocities, friction_of
+from iapb.contact.kernels.rows import contact_velocities
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.linalg import (
     add,
@@ -371,6 +371,4 @@ def rest(world, state, stage):
         store(contacts.friction_force, i, (0.0, 0.0, 0.0))
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         if group >= 0 and state.state_of_tree[group] != COLLIDING:
-            friction = 0.0 if world.coulomb else friction_of(world, contacts, i)
-            resting_force(world.mechanism, state.body, contacts, i, world.stiffness, world.damping, world.clamped,
-                          friction, world.friction_velocity, state.stage_penalty, state.stage_friction)
+            resting_force(world, state, contacts, i)
