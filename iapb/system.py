@@ -14,10 +14,9 @@ from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, count
 from iapb.compiled import Entry, block, columns, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
-from iapb.contact.kernels.coulomb import StepFriction
+from iapb.contact.kernels.coulomb import RestWork
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
-from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import PushWork
@@ -179,11 +178,11 @@ class System:
         scene, contact, mechanism, c = self.scene, self.scene.contact, self.mechanism, self.capacity
         trees, d, tangents = len(mechanism.tree_dofs), mechanism.nv, self.tangents
         largest = max((stop - start for start, stop in mechanism.tree_dofs), default=0)
-        per_body, implicit = contact.self_collision_rows == "per_body", contact.forces == "implicit"
+        per_body = contact.self_collision_rows == "per_body"
         rows = c * (2 if per_body else 1)  # (13)-(14): two each
         rubbing = scene.largest_friction > 0.0
         sliding = rubbing and not per_body  # per-body rows have no slip, so no friction in impacts
-        creeping = rubbing and contact.friction_law == "coulomb" and not implicit
+        soft = contact.forces == "implicit" or rubbing and contact.friction_law == "coulomb"
         log = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
         for name, value in {"scale": 1, "clamp": 1, "friction_share": 1, "solved": 1, "approaching": -1}.items():
             log[name][:] = value  # where a law written in Python does not set it
@@ -196,10 +195,8 @@ class System:
             push_work=zeros_of(PushWork, velocity=d, row=rows, passive=d + 1),
             friction_work=zeros_of(FrictionWork, velocity=d * sliding, row=rows * sliding,
                                    tangent=rows * tangents * sliding, direction=tangents),
-            step_friction=zeros_of(StepFriction, velocity=d, contact=c * creeping, row=c * tangents * creeping,
-                                   width=2 * largest, direction=tangents),
-            rest_work=zeros_of(RestWork, velocity=d * implicit, contact=c * implicit,
-                               row=c * (1 + tangents) * implicit, width=2 * largest, tree=trees),
+            rest_work=zeros_of(RestWork, velocity=d * soft, contact=c * soft, row=c * (1 + tangents) * soft,
+                               width=2 * largest, direction=tangents, tree=trees),
             impacts=columns("ImpactLog", {"logged": np.zeros(1, np.int64), **log}),
         )
         state.q[:], state.v[:] = self.start

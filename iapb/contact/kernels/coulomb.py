@@ -24,23 +24,43 @@ SWEEPS = 30  # at most in a step: what a pile has not settled by then it slips, 
 STILL = 1e-6  # share of the fastest slip: a sweep that changes velocities by less is the last one
 
 
-class StepFriction(NamedTuple):
-    """Scratch of the friction of one step, with a row for each tangent (1 planar, 2 spatial).
+class RestWork(NamedTuple):
+    """Scratch of resting contact, implicit in the velocity: of one group (`rest_group`), or friction of all contacts.
 
-    `width` is twice the number of coordinates of the largest tree.
+    Each contact has a row for the normal and for each tangent, or only for the tangents. Local coordinates number those
+    of the group, or of all. `width` is twice the number of coordinates of the largest tree.
     """
 
-    contact: Annotated[Integers, "contact"]  # contacts that carry friction in this step
-    at: Annotated[Integers, "contact 2"]  # first coordinate of each of their two trees
+    contact: Annotated[Integers, "contact"]  # contacts that carry a force in this step
+    at: Annotated[Integers, "contact 2"]  # first local coordinate of each of their two trees
     size: Annotated[Integers, "contact 2"]  # number of coordinates of these; 0 = no tree, or the first one again
-    rows: Annotated[Floats, "row width"]  # rows of J L⁻ᵀ: one half for each of the two trees; the rest is zero
-    slip: Annotated[Floats, "row"]  # tangential velocity without friction [m/s]
-    p: Annotated[Floats, "row"]  # tangential impulses [N s]
-    radius: Annotated[Floats, "contact"]  # limit μ F_n Δt [N s]
+    rows: Annotated[Floats, "row width"]  # rows of J, for friction alone J L⁻ᵀ: one half for each of the two trees
+    speed: Annotated[Floats, "row"]  # J v [m/s]; for friction alone that without friction
+    p: Annotated[Floats, "row"]  # impulses of the step [N s]
+    limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
+    # Of friction alone
     inertia: Annotated[Floats, "contact"]  # largest eigenvalue of the contact's own block of J M⁻¹ Jᵀ [1/kg]
     moved: Annotated[Floats, "velocity"]  # Lᵀ Δv
     local: Annotated[Floats, "width"]  # entries of `moved` for the two trees of one contact
     velocity: Annotated[Floats, "direction"]
+    # Of a group
+    first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
+    next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
+    next_tree: Annotated[Integers, "tree"]  # tree of the same group that follows, −1 = none
+    offset: Annotated[Integers, "tree"]  # first local coordinate of each tree
+    dof: Annotated[Integers, "velocity"]  # the coordinate v[dof] of each local one
+    begin: Annotated[Integers, "velocity"]  # first local coordinate of its tree
+    end: Annotated[Integers, "velocity"]  # and the one after the last
+    envelope: Annotated[Integers, "velocity"]  # first nonzero column of each row of the Newton matrix
+    change: Annotated[Floats, "row"]  # J Δv of a Newton step
+    v: Annotated[Floats, "velocity"]  # local velocities
+    free: Annotated[Floats, "velocity"]  # v*
+    balance: Annotated[Floats, "velocity"]  # M (v − v*) − Jᵀ p
+    change_of_v: Annotated[Floats, "velocity"]  # v − v*
+    step: Annotated[Floats, "velocity"]  # Newton step
+    given: Annotated[Floats, "velocity"]  # M times a vector, or L⁻¹ of one
+    energy: Annotated[Floats, "1"]  # ½ v*ᵀ M v* [J]
+    shortened: Annotated[Integers, "1"]  # solutions that were shortened, since the start
 
 
 @kernel
@@ -83,12 +103,12 @@ def add_step_friction(world, state):
     Poses and factor of M are those at the start of the step; v is the velocity that the other forces lead to. Trees
     with friction move with the new velocity under every integrator, so the work of friction is p · J v⁺.
     """
-    f, dt, size = state.step_friction, world.dt, state.step_friction.velocity.shape[0]
+    f, dt, size = state.rest_work, world.dt, state.rest_work.velocity.shape[0]
     count = _gather(world, state)
     if count == 0:
         return
     _sweep(f, count)
-    factor = passive_factor(f.p[: count * size], f.slip, f.moved)
+    factor = passive_factor(f.p[: count * size], f.speed, f.moved)
     for r in range(count):
         i, force = f.contact[r], (0.0, 0.0, 0.0)
         n, x = load(state.contacts.normal, i), load(state.contacts.point, i)
@@ -119,13 +139,13 @@ def passive_factor(p, slip, moved):
 @kernel
 def _gather(world, state):
     """Write rows, slips, limits and starting impulses of the contacts with F_n > 0; return their number."""
-    f, contacts, size = state.step_friction, state.contacts, state.step_friction.velocity.shape[0]
+    f, contacts, size = state.rest_work, state.contacts, state.rest_work.velocity.shape[0]
     count = begin = 0
     for i in range(state.contact_count[0]):
         if not contacts.normal_force[i] > 0.0:
             continue
         f.contact[count] = i
-        f.radius[count] = friction_of(world, contacts, i) * contacts.normal_force[i] * world.dt
+        f.limit[count] = friction_of(world, contacts, i) * contacts.normal_force[i] * world.dt
         trees = trees_of_contact(world, contacts, i, world.tree_start, f.at[count], f.size[count])
         before = contact_before(state, i, begin)
         n, held, square = load(contacts.normal, i), (0.0, 0.0, 0.0), 0.0
@@ -135,7 +155,7 @@ def _gather(world, state):
             j, tangent = count * size + a, tangent_of(n, a, size)
             f.rows[j] = 0.0
             write_pair_row(world, state, trees, i, tangent, f.rows[j])
-            f.slip[j] = along_row(f, count, j, state.v)
+            f.speed[j] = along_row(f, count, j, state.v)
             for side in range(2):  # L x = row, tree by tree
                 at, own = f.at[count, side], f.rows[j, side * (f.rows.shape[1] // 2) :]
                 for k in range(f.size[count, side]):
@@ -144,9 +164,9 @@ def _gather(world, state):
                     own[k] /= state.lower[at + k, at + k]
             f.p[j] = dot(held, tangent)
             square += f.p[j] * f.p[j]
-        if square > f.radius[count] * f.radius[count]:
+        if square > f.limit[count] * f.limit[count]:
             for j in range(count * size, (count + 1) * size):
-                f.p[j] *= f.radius[count] / math.sqrt(square)
+                f.p[j] *= f.limit[count] / math.sqrt(square)
         f.inertia[count] = tangent_inertia(f.rows, count * size, size)
         count += 1
     return count
@@ -162,9 +182,9 @@ def _sweep(f, count):
     f.moved[:] = 0.0
     for r in range(count):
         for j in range(r * size, (r + 1) * size):
-            still = max(still, STILL * abs(f.slip[j]))
+            still = max(still, STILL * abs(f.speed[j]))
             add_along_row(f, r, j, f.p[j], f.moved)
-    if dot_of(f.p[: count * size], f.slip[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
+    if dot_of(f.p[: count * size], f.speed[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
         f.p[: count * size] = 0.0
         f.moved[:] = 0.0
     for _ in range(SWEEPS):
@@ -176,7 +196,7 @@ def _sweep(f, count):
             for side in range(2):
                 for k in range(f.size[r, side]):
                     f.local[side * half + k] = f.moved[f.at[r, side] + k]
-            moves = slide(f.rows, f.slip, f.radius[r], f.inertia[r], f.p, f.local, f.velocity, r * size)
+            moves = slide(f.rows, f.speed, f.limit[r], f.inertia[r], f.p, f.local, f.velocity, r * size)
             fastest = max(fastest, moves)
             for side in range(2):
                 for k in range(f.size[r, side]):

@@ -17,14 +17,12 @@ Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import LEFT, contact_before, group_of_contact
 from iapb.contact.kernels.coulomb import add_along_row, along_row, trees_of_contact
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
 from iapb.linalg import add, add_multiple, dot_of, load, scale, store
-from iapb.schema import Floats, Integers
 
 STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
 EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies
@@ -35,38 +33,6 @@ FREE_TURNS = 3  # of these take the new limits whole; the others half, for limit
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
 SEARCHES = 40  # evaluations of a line search
 GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
-
-
-class RestWork(NamedTuple):
-    """Scratch of one group's resting contacts, with a row for the normal and for each tangent.
-
-    Local coordinates number those of the group; `width` is twice the number of coordinates of the largest tree.
-    """
-
-    first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
-    next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
-    next_tree: Annotated[Integers, "tree"]  # tree of the same group that follows, −1 = none
-    offset: Annotated[Integers, "tree"]  # first local coordinate of each tree
-    dof: Annotated[Integers, "velocity"]  # the coordinate v[dof] of each local one
-    begin: Annotated[Integers, "velocity"]  # first local coordinate of its tree
-    end: Annotated[Integers, "velocity"]  # and the one after the last
-    envelope: Annotated[Integers, "velocity"]  # first nonzero column of each row of the Newton matrix
-    contact: Annotated[Integers, "contact"]  # contacts of the group
-    at: Annotated[Integers, "contact 2"]  # first local coordinate of each of their two trees
-    size: Annotated[Integers, "contact 2"]  # number of coordinates of these; 0 = no tree, or the first one again
-    rows: Annotated[Floats, "row width"]  # rows of J: one half for each of the two trees
-    speed: Annotated[Floats, "row"]  # J v [m/s]
-    change: Annotated[Floats, "row"]  # J Δv of a Newton step
-    p: Annotated[Floats, "row"]  # impulses of the step [N s]
-    limit: Annotated[Floats, "contact"]  # limits c of friction [N s]
-    v: Annotated[Floats, "velocity"]  # local velocities
-    free: Annotated[Floats, "velocity"]  # v*
-    balance: Annotated[Floats, "velocity"]  # M (v − v*) − Jᵀ p
-    change_of_v: Annotated[Floats, "velocity"]  # v − v*
-    step: Annotated[Floats, "velocity"]  # Newton step
-    given: Annotated[Floats, "velocity"]  # M times a vector, or L⁻¹ of one
-    energy: Annotated[Floats, "1"]  # ½ v*ᵀ M v* [J]
-    shortened: Annotated[Integers, "1"]  # solutions that were shortened, since the start
 
 
 @kernel(needs="implicit")

@@ -8,10 +8,9 @@ import numpy as np
 
 from iapb.contact.geometry import ContactBuffer, Shapes
 from iapb.contact.kernels.broadphase import BroadPhase
-from iapb.contact.kernels.coulomb import StepFriction
+from iapb.contact.kernels.coulomb import RestWork
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
-from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.free_motion import FreeMotion
@@ -134,7 +133,6 @@ class State(NamedTuple):
     work: ImpactWork
     push_work: PushWork
     friction_work: FrictionWork
-    step_friction: StepFriction
     rest_work: RestWork
     located_q: Annotated[Floats, "coordinate"]  # configuration of mass_matrix and lower; NaN: any
     root_momentum: Annotated[Floats, "root"]  # scratch of free motion: a root's momentum and its centre
