@@ -395,7 +395,8 @@ def give_back(world, state, size, count, s):
     """Write the group's velocity to v and mean_v, and the forces to the contacts and the generalized forces."""
     work, contacts = state.rest_work, state.contacts
     pushed, rubbed = work.given[:size], work.step[:size]
-    pushed[:], rubbed[:] = 0.0, 0.0
+    for i in range(size):
+        pushed[i] = rubbed[i] = 0.0
     for r in range(count):
         i, force = work.contact[r], (0.0, 0.0, 0.0)
         contacts.normal_force[i] = work.p[r * s] / world.dt

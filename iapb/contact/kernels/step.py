@@ -85,9 +85,8 @@ def contact_state(state, tool_tree):
 @kernel
 def clear(state):
     """Set the forces and impulses of the step before to zero."""
-    state.penalty_force[:] = 0.0
-    state.friction_force[:] = 0.0
-    state.impulse[:] = 0.0
+    for k in range(state.v.shape[0]):
+        state.penalty_force[k] = state.friction_force[k] = state.impulse[k] = 0.0
     state.impacts.logged[0] = 0
 
 
@@ -155,8 +154,8 @@ def move(world, state, applied):
     """Integrate (7) over Δt: forces at each stage, new velocity, new configuration."""
     copy_into(state.start_q, state.q)
     copy_into(state.start_v, state.v)
-    state.mean_v[:] = 0.0
-    state.mean_acceleration[:] = 0.0
+    for k in range(state.v.shape[0]):
+        state.mean_v[k] = state.mean_acceleration[k] = 0.0
     for stage in range(world.stage_weight.shape[0]):
         weight, time = world.stage_weight[stage], world.dt * world.stage_fraction[stage]
         if stage > 0:  # with velocity and acceleration of the stage before
@@ -357,8 +356,8 @@ def accelerate(world, state, applied, stage):
 @kernel
 def rest(world, state, stage):
     """Write the forces (4)-(6) at the contacts of groups that do not collide; in a collision the impulse acts."""
-    state.stage_penalty[:] = 0.0
-    state.stage_friction[:] = 0.0
+    for k in range(state.v.shape[0]):
+        state.stage_penalty[k] = state.stage_friction[k] = 0.0
     if not world.switches.contacts or world.implicit:
         return
     contacts, count = state.contacts, state.contact_count[0]
