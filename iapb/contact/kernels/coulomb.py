@@ -3,7 +3,7 @@
 The other forces of the step lead to v. Friction adds Δv = M⁻¹ Jᵀ p with the tangential impulses p that minimize
 ½ Δvᵀ M Δv + p · J v in the discs |p_i| ≤ μ F_n,i Δt, where F_n are the normal forces (5) of the step. Each contact
 stops, or slides against p_i at the limit. The sweeps over the contacts start at a p where this function is not above
-zero, and each sweep lowers it, so friction takes kinetic energy after any number of sweeps. `passive_factor` also
+zero, and each sweep lowers it, so friction takes kinetic energy after any number of sweeps. A last factor
 keeps the work of friction over the step from being positive.
 """
 
@@ -108,7 +108,9 @@ def add_step_friction(world, state):
     if count == 0:
         return
     _sweep(f, count)
-    factor = passive_factor(f.p[: count * size], f.speed, f.moved)
+    # The largest factor with which friction does no positive work in the step: α p · slip + α² |moved|² ≤ 0.
+    given, square = dot_of(f.speed, f.p[: count * size]), dot_of(f.moved, f.moved)
+    factor = 0.0 if given >= 0.0 else 1.0 if square <= -given else -given / square
     for r in range(count):
         i, force = f.contact[r], (0.0, 0.0, 0.0)
         n, x = load(state.contacts.normal, i), load(state.contacts.point, i)
@@ -125,15 +127,6 @@ def add_step_friction(world, state):
         for side in range(2):
             for k in range(f.at[r, side], f.at[r, side] + f.size[r, side]):
                 state.mean_v[k] = state.v[k]
-
-
-@kernel
-def passive_factor(p, slip, moved):
-    """Return the largest α ≤ 1 with which friction does no positive work in the step: α p · slip + α² |moved|² ≤ 0."""
-    given, square = dot_of(p, slip[: p.shape[0]]), dot_of(moved, moved)
-    if given >= 0.0:
-        return 0.0
-    return 1.0 if square <= -given else -given / square
 
 
 @kernel
