@@ -145,7 +145,7 @@ def add_friction_to_impact(world, state, size, count, rank):
             tangent = tangent_of(load(contacts.normal, i), a, tangents)
             direction_row(world.mechanism, state.body, contacts, i, tangent, state.row)
             for k in range(size):
-                f.free[r * tangents + a, k] = state.row[state.dofs[k]]
+                f.rows[r * tangents + a, k] = state.row[state.dofs[k]]
     return add_impact_friction(
         state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size], count, rank,
         state.work, state.push_work, f, state.row_impulse, state.group_v_plus[:size], state.group_impulse[:size])

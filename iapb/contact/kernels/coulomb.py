@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import contact_before, moving_tree
-from iapb.contact.kernels.impact_friction import slide, tangent_inertia
+from iapb.contact.kernels.impact_friction import along_row, combine, friction_sweeps, set_inertia
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
 from iapb.linalg import add, dot, dot_of, load, scale, solve_tree_blocks, store
 from iapb.mechanics.kernels.kinematics import add_point_force
@@ -39,9 +39,9 @@ class RestWork(NamedTuple):
     p: Annotated[Floats, "row"]  # impulses of the step [N s]
     limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
     # Of friction alone
-    inertia: Annotated[Floats, "contact"]  # largest eigenvalue of the contact's own block of J M⁻¹ Jᵀ [1/kg]
+    block: Annotated[Floats, "contact 3"]  # entries xx, xy, yy of the contact's own block of J M⁻¹ Jᵀ [1/kg]
+    inertia: Annotated[Floats, "contact"]  # its largest eigenvalue
     moved: Annotated[Floats, "velocity"]  # Lᵀ Δv
-    local: Annotated[Floats, "width"]  # entries of `moved` for the two trees of one contact
     velocity: Annotated[Floats, "direction"]
     # Of a group
     first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
@@ -75,27 +75,6 @@ def trees_of_contact(world, contacts, i, start, at, size):
     return trees
 
 
-@kernel
-def along_row(work, r, j, v):
-    """Return row j, of contact r, times v."""
-    total, row, half = 0.0, work.rows[j], work.rows.shape[1] // 2
-    for side in range(2):
-        at = work.at[r, side]
-        for k in range(work.size[r, side]):
-            total += row[side * half + k] * v[at + k]
-    return total
-
-
-@kernel
-def add_along_row(work, r, j, factor, out):
-    """out += factor times row j, of contact r."""
-    row, half = work.rows[j], work.rows.shape[1] // 2
-    for side in range(2):
-        at = work.at[r, side]
-        for k in range(work.size[r, side]):
-            out[at + k] += factor * row[side * half + k]
-
-
 @kernel(needs="coulomb")
 def add_step_friction(world, state):
     """Add the friction of the step to v; write friction_force (d,) and that of each contact.
@@ -107,7 +86,14 @@ def add_step_friction(world, state):
     count = _gather(world, state)
     if count == 0:
         return
-    _sweep(f, count)
+    fastest = 0.0
+    for j in range(count * size):
+        fastest = max(fastest, abs(f.speed[j]))
+    combine(count, f)
+    if dot_of(f.speed, f.p[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
+        f.p[: count * size] = 0.0
+        f.moved[:] = 0.0
+    friction_sweeps(count, f, SWEEPS, STILL * fastest, False)
     # The largest factor with which friction does no positive work in the step: α p · slip + α² |moved|² ≤ 0.
     given, square = dot_of(f.speed, f.p[: count * size]), dot_of(f.moved, f.moved)
     factor = 0.0 if given >= 0.0 else 1.0 if square <= -given else -given / square
@@ -160,39 +146,6 @@ def _gather(world, state):
         if square > f.limit[count] * f.limit[count]:
             for j in range(count * size, (count + 1) * size):
                 f.p[j] *= f.limit[count] / math.sqrt(square)
-        f.inertia[count] = tangent_inertia(f.rows, count * size, size)
+        set_inertia(f, count, f.rows.shape[1])
         count += 1
     return count
-
-
-@kernel
-def _sweep(f, count):
-    """Sweep p, contact by contact, until a sweep changes no velocity by more than STILL; write `moved` for this p.
-
-    It starts from the impulses of the step before if they take energy, else from zero.
-    """
-    size, half, still = f.velocity.shape[0], f.local.shape[0] // 2, 0.0
-    f.moved[:] = 0.0
-    for r in range(count):
-        for j in range(r * size, (r + 1) * size):
-            still = max(still, STILL * abs(f.speed[j]))
-            add_along_row(f, r, j, f.p[j], f.moved)
-    if dot_of(f.p[: count * size], f.speed[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
-        f.p[: count * size] = 0.0
-        f.moved[:] = 0.0
-    for _ in range(SWEEPS):
-        fastest = 0.0
-        for r in range(count):
-            if not f.inertia[r] > 0.0:
-                continue
-            f.local[:] = 0.0
-            for side in range(2):
-                for k in range(f.size[r, side]):
-                    f.local[side * half + k] = f.moved[f.at[r, side] + k]
-            moves = slide(f.rows, f.speed, f.limit[r], f.inertia[r], f.p, f.local, f.velocity, r * size)
-            fastest = max(fastest, moves)
-            for side in range(2):
-                for k in range(f.size[r, side]):
-                    f.moved[f.at[r, side] + k] = f.local[side * half + k]
-        if fastest <= still:
-            break

@@ -25,7 +25,7 @@ from iapb.contact.kernels.projector import add_minimum_norm, minimum_norm_factor
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
 from iapb.linalg import add_multiple, dot_of, from_whitened, orthogonalize
-from iapb.schema import Floats
+from iapb.schema import Floats, Integers
 
 GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 
@@ -33,14 +33,17 @@ GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the
 class FrictionWork(NamedTuple):
     """Scratch of the friction of one impact: each row is a contact with 1 (planar) or 2 (spatial) tangents."""
 
-    free: Annotated[Floats, "tangent velocity"]  # tangents' rows of J, then of A, then B
+    at: Annotated[Integers, "row 2"]  # 0, and
+    size: Annotated[Integers, "row 2"]  # the number of coordinates and 0, as the rows have one part: see `along_row`
+    rows: Annotated[Floats, "tangent velocity"]  # tangents' rows of J, then of A, then B
     normal_part: Annotated[Floats, "tangent velocity"]  # A_t Qᵀ: the removed part, along the basis
-    slip: Annotated[Floats, "tangent"]  # tangential velocity after the normal impact [m/s]
+    speed: Annotated[Floats, "tangent"]  # tangential velocity after the normal impact [m/s]
     p: Annotated[Floats, "tangent"]  # tangential impulses [N s]
-    inertia: Annotated[Floats, "row"]  # ‖B_i B_iᵀ‖ [1/kg]
+    block: Annotated[Floats, "row 3"]  # the entries xx, xy, yy of B_i B_iᵀ [1/kg]
+    inertia: Annotated[Floats, "row"]  # its largest eigenvalue
     response: Annotated[Floats, "tangent"]  # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
     coefficient: Annotated[Floats, "row"]  # μ
-    radius: Annotated[Floats, "row"]  # Coulomb's limit μ p_n [N s]
+    limit: Annotated[Floats, "row"]  # Coulomb's limit μ p_n [N s]
     change: Annotated[Floats, "row"]  # change of each limit required by a round
     sliding: Annotated[Floats, "row"]  # μ; 0 where the frictionless normal impulse pulls
     without: Annotated[Floats, "row"]  # normal impulses without friction [N s]
@@ -53,7 +56,7 @@ class FrictionWork(NamedTuple):
 
 @kernel
 def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impulses, v_plus, momentum):
-    """Add Coulomb friction to the normal impact in `work`; `f.free` holds the tangents' rows of J, `f.coefficient` μ.
+    """Add Coulomb friction to the normal impact in `work`; `f.rows` holds the tangents' rows of J, `f.coefficient` μ.
 
     Writes v⁺, the generalized impulse, the normal impulses (count,) and the tangential ones, `f.p`; returns (share of
     friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, also before convergence. The share is α
@@ -64,7 +67,7 @@ def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impul
     scale = split_tangents(lower, count, rank, work, f, d)
     met = settle_friction(count, rank, work, push, f, d, scale)
     share = share_within_cone(count, f)
-    combine(f.free, p, moved)
+    combine(count, f)
     for k in range(d):
         moved[k] *= share
     alpha = passive_share(u, change, moved)
@@ -87,11 +90,11 @@ def split_tangents(lower, count, rank, work, f, d):
     """
     u, largest = work.u[:d], 0.0
     for j in range(count * f.velocity.shape[0]):
-        row, slip = f.free[j, :d], 0.0
+        row, slip = f.rows[j, :d], 0.0
         for k in range(d):  # L x = row
             row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
             slip += row[k] * (u[k] + work.change[k])
-        f.slip[j], before = slip, dot_of(row, row)
+        f.speed[j], before = slip, dot_of(row, row)
         largest = max(largest, before)
         if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
@@ -161,7 +164,8 @@ def settle_friction(count, rank, work, push, f, d, scale):
     """
     size = f.velocity.shape[0]
     for i in range(count):
-        f.inertia[i] = tangent_inertia(f.free[:, :d], i * size, size)
+        f.size[i, 0] = d
+        set_inertia(f, i, d)
     f.p[: count * size] = 0.0
     if _start(count, rank, work, push, f, d) and _settle(count, rank, work, f, d, scale, True):
         _trim(count, rank, work, f, True)
@@ -169,28 +173,16 @@ def settle_friction(count, rank, work, push, f, d, scale):
     f.p[: count * size] = 0.0
     _move_normals(count, rank, work, f, False)
     for i in range(count):
-        f.without[i], f.radius[i] = f.wanted[i], 0.0
+        f.without[i], f.limit[i] = f.wanted[i], 0.0
         f.sliding[i] = f.coefficient[i] if f.without[i] > 0.0 else 0.0  # contacts that pull get no friction
     if _settle(count, rank, work, f, d, scale, False):
         _trim(count, rank, work, f, False)
         return True
     for i in range(count):
-        f.radius[i] = f.sliding[i] * max(f.without[i], 0.0)
-    friction_sweeps(count, d, f, HELD_SWEEPS, STILL * scale)
+        f.limit[i] = f.sliding[i] * max(f.without[i], 0.0)
+    friction_sweeps(count, f, HELD_SWEEPS, STILL * scale, True)
     _move_normals(count, rank, work, f, False)
     return False
-
-
-@kernel
-def tangent_inertia(free, first, size):
-    """Return the largest eigenvalue of B_i B_iᵀ, which has one or two rows."""
-    x = free[first]
-    xx = dot_of(x, x)
-    if size == 1:
-        return xx
-    y = free[first + 1]
-    yy, xy = dot_of(y, y), dot_of(x, y)
-    return 0.5 * (xx + yy) + hypotenuse(0.5 * (xx - yy), xy)
 
 
 @kernel
@@ -215,7 +207,7 @@ def _start(count, rank, work, push, f, d):
         return False
     for i in range(count):
         f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
-        f.sliding[i], f.radius[i] = f.coefficient[i], 0.0
+        f.sliding[i], f.limit[i] = f.coefficient[i], 0.0
     _move_normals(count, rank, work, f, False)  # an active set loads only a few of redundant contacts
     return True
 
@@ -253,18 +245,18 @@ def _settle(count, rank, work, f, d, scale, pushes):
                 f.wanted[i] = max(f.wanted[i], 0.0)
             own, stride = f.p[i * size : (i + 1) * size], 1.0
             length = math.sqrt(dot_of(own, own))
-            if length > 0.0 and length >= AT_LIMIT * f.radius[i]:  # Newton's step for a single sliding contact
+            if length > 0.0 and length >= AT_LIMIT * f.limit[i]:  # Newton's step for a single sliding contact
                 gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
                 stride = 1.0 / max(1.0 - gain, 1.0 / STRIDE)
-            f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.radius[i]
-            f.radius[i] = max(0.0, f.radius[i] + step * stride * f.change[i])
-        moved = friction_sweeps(count, d, f, 1, 0.0)
+            f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.limit[i]
+            f.limit[i] = max(0.0, f.limit[i] + step * stride * f.change[i])
+        moved = friction_sweeps(count, f, 1, 0.0, True)
         if moved > still:
-            friction_sweeps(count, d, f, SWEEPS - 1, SETTLED * moved)
+            friction_sweeps(count, f, SWEEPS - 1, SETTLED * moved, True)
         for i in range(count):  # an undamped limit that holds p_t would move it on
             own, change = f.p[i * size : (i + 1) * size], abs(f.change[i])
             length = math.sqrt(dot_of(own, own))
-            if length >= f.radius[i] - STRIDE * change:
+            if length >= f.limit[i] - STRIDE * change:
                 moved = max(moved, f.inertia[i] * min(change, length))
         if speed > 0.0:
             moved = max(moved, scale * (defect / speed))
@@ -297,75 +289,110 @@ def _trim(count, rank, work, f, near):
 
 
 # Tangential impulses within Coulomb's discs: sweeps over the contacts; each contact stops or slides at its limit.
+# Here and in resting contact: `f` is a `FrictionWork` or a `RestWork`.
 
 # sin² of the angle between two tangents' rows; below it one row is a multiple of the other, up to rounding.
 SINGULAR = 1e-12
 
 
 @kernel
-def friction_sweeps(count, d, f, sweeps, still):
+def along_row(work, r, j, v):
+    """Return row j, of contact r, times v; each half of the row holds the entries of one of the contact's two trees."""
+    total, row, half = 0.0, work.rows[j], work.rows.shape[1] // 2
+    for side in range(2):
+        at = work.at[r, side]
+        for k in range(work.size[r, side]):
+            total += row[side * half + k] * v[at + k]
+    return total
+
+
+@kernel
+def add_along_row(work, r, j, factor, out):
+    """out += factor times row j, of contact r."""
+    row, half = work.rows[j], work.rows.shape[1] // 2
+    for side in range(2):
+        at = work.at[r, side]
+        for k in range(work.size[r, side]):
+            out[at + k] += factor * row[side * half + k]
+
+
+@kernel
+def set_inertia(f, i, width):
+    """Write the entries of B_i B_iᵀ, which has one or two rows, and its largest eigenvalue."""
+    size = f.velocity.shape[0]
+    x, y = f.rows[i * size, :width], f.rows[i * size + size - 1, :width]
+    xx, xy, yy = dot_of(x, x), dot_of(x, y), dot_of(y, y)
+    f.block[i, 0], f.block[i, 1], f.block[i, 2] = xx, xy, yy
+    f.inertia[i] = xx if size == 1 else 0.5 * (xx + yy) + hypotenuse(0.5 * (xx - yy), xy)
+
+
+@kernel
+def combine(count, f):
+    """Write moved = Bᵀ p."""
+    size = f.velocity.shape[0]
+    f.moved[:] = 0.0
+    for i in range(count):
+        for j in range(i * size, (i + 1) * size):
+            add_along_row(f, i, j, f.p[j], f.moved)
+
+
+@kernel
+def friction_sweeps(count, f, sweeps, still, anew):
     """Sweep over the contacts: set p_i so that w_i = 0 if its disc allows this, else to proj(p_i − w_i / ρ_i).
 
-    w = slip + B Bᵀ p is the tangential velocity, proj projects on the disc of radius radius_i; p changes in place.
-    Stops after a sweep that changes no velocity by more than `still`; returns the largest change of the last one [m/s].
+    w = speed + B moved is the tangential velocity, moved = Bᵀ p, proj projects on the disc of radius limit_i. p and
+    moved change in place; `anew` combines moved in every sweep, so that rounding does not add up. Stops after a sweep
+    that changes no velocity by more than `still`; returns the largest change of the last one [m/s].
     """
-    size, free, moved, fastest = f.velocity.shape[0], f.free[:, :d], f.moved[:d], 0.0
+    fastest = 0.0
     for _ in range(sweeps):
-        combine(f.free, f.p[: count * size], moved)  # anew in every sweep: rounding does not add up
+        if anew:
+            combine(count, f)
         fastest = 0.0
         for i in range(count):
             if f.inertia[i] > 0.0:
-                fastest = max(fastest, slide(free, f.slip, f.radius[i], f.inertia[i], f.p, moved, f.velocity, i * size))
+                fastest = max(fastest, _slide(f, i))
         if fastest <= still:
             break
     return fastest
 
 
 @kernel
-def combine(rows, weight, out):
-    """Write out (d,) = rowsᵀ weight; longer rows are cut."""
-    out[:] = 0.0
-    for j in range(weight.shape[0]):
-        add_multiple(out, weight[j], rows[j])
-
-
-@kernel
-def slide(free, slip, radius, inertia, p, moved, velocity, first):
+def _slide(f, i):
     """Move one contact's impulse to stop its slip, or towards its limit; return the change of velocity [m/s]."""
-    size = velocity.shape[0]
+    velocity, size = f.velocity, f.velocity.shape[0]
+    first, limit, inertia = i * size, f.limit[i], f.inertia[i]
     for a in range(size):
-        velocity[a] = slip[first + a] + dot_of(free[first + a], moved)
+        velocity[a] = f.speed[first + a] + along_row(f, i, first + a, f.moved)
     fastest = math.sqrt(dot_of(velocity, velocity))
-    if not _stops(free, radius, p, velocity, first):
+    if not _stops(f, i, first):
         for a in range(size):
-            velocity[a] = p[first + a] - velocity[a] / inertia
+            velocity[a] = f.p[first + a] - velocity[a] / inertia
         length = math.sqrt(dot_of(velocity, velocity))
-        share = radius / length if length > radius else 1.0
+        share = limit / length if length > limit else 1.0
         for a in range(size):
             velocity[a] *= share
         fastest = 0.0
         for a in range(size):
-            fastest = max(fastest, inertia * abs(velocity[a] - p[first + a]))
+            fastest = max(fastest, inertia * abs(velocity[a] - f.p[first + a]))
     for a in range(size):
-        change = velocity[a] - p[first + a]
-        p[first + a] += change
-        add_multiple(moved, change, free[first + a])
+        change = velocity[a] - f.p[first + a]
+        f.p[first + a] += change
+        add_along_row(f, i, first + a, change, f.moved)
     return fastest
 
 
 @kernel
-def _stops(free, radius, p, velocity, first):
+def _stops(f, i, first):
     """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds the limit."""
-    if velocity.shape[0] != 2:  # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
+    if f.velocity.shape[0] != 2:  # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
         return False
-    x, y = free[first], free[first + 1]
-    xx, yy, xy = dot_of(x, x), dot_of(y, y), dot_of(x, y)
+    xx, xy, yy, v, w = f.block[i, 0], f.block[i, 1], f.block[i, 2], f.velocity[0], f.velocity[1]
     det = xx * yy - xy * xy
     if det <= SINGULAR * xx * yy:
         return False
-    one = p[first] - (yy * velocity[0] - xy * velocity[1]) / det
-    two = p[first + 1] - (xx * velocity[1] - xy * velocity[0]) / det
-    if one * one + two * two > radius * radius:
+    one, two = f.p[first] - (yy * v - xy * w) / det, f.p[first + 1] - (xx * w - xy * v) / det
+    if one * one + two * two > f.limit[i] * f.limit[i]:
         return False
-    velocity[0], velocity[1] = one, two
+    f.velocity[0], f.velocity[1] = one, two
     return True

@@ -20,7 +20,8 @@ import math
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import LEFT, contact_before, group_of_contact
-from iapb.contact.kernels.coulomb import add_along_row, along_row, trees_of_contact
+from iapb.contact.kernels.coulomb import trees_of_contact
+from iapb.contact.kernels.impact_friction import add_along_row, along_row
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
 from iapb.linalg import add, add_multiple, dot_of, load, scale, store
 

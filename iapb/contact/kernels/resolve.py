@@ -98,7 +98,7 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
             else:
                 for j in range(p_t.shape[0]):
                     for i in range(d):
-                        f.free[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
+                        f.rows[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
                 copy_into(f.coefficient[:c], friction[m])
                 share, factor, met = add_impact_friction(work.mass, lower, work.velocity, c, rank, impact, work.push,
                                                          f, p, work.v_plus, momentum)
