@@ -16,7 +16,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import contact_before, moving_tree
 from iapb.contact.kernels.impact_friction import along_row, combine, friction_sweeps, set_inertia
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
-from iapb.linalg import add, dot, dot_of, load, scale, solve_tree_blocks, store
+from iapb.linalg import add, add_multiple, dot, dot_of, load, scale, solve_tree_blocks, store
 from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.schema import Floats, Integers
 
@@ -90,6 +90,7 @@ def add_step_friction(world, state):
     for j in range(count * size):
         fastest = max(fastest, abs(f.speed[j]))
     combine(count, f)
+    # The start: the impulses of the step before if they take energy, else zero.
     if dot_of(f.speed, f.p[: count * size]) + 0.5 * dot_of(f.moved, f.moved) > 0.0:
         f.p[: count * size] = 0.0
         f.moved[:] = 0.0
@@ -107,8 +108,7 @@ def add_step_friction(world, state):
         add_point_force(world.mechanism, state.body, state.contacts.body_b[i], x, scale(-1.0, force),
                         state.friction_force)
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.friction_force, f.moved)
-    for k in range(state.v.shape[0]):
-        state.v[k] += dt * f.moved[k]
+    add_multiple(state.v, dt, f.moved)
     for r in range(count):
         for side in range(2):
             for k in range(f.at[r, side], f.at[r, side] + f.size[r, side]):
