@@ -81,7 +81,7 @@ def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin
     """Write the contacts of all pairs; return their number."""
     n = 0
     for k in range(len(pairs)):
-        a, b = pairs[k, 0], pairs[k, 1]
+        a, b, start = pairs[k, 0], pairs[k, 1], n
         ka, kb = kind[a], kind[b]
         pa, pb = corners[first[a] : first[a] + count[a]], corners[first[b] : first[b] + count[b]]
         round_a, round_b = ka in (CIRCLE, SPHERE), kb in (CIRCLE, SPHERE)
@@ -105,18 +105,14 @@ def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin
             n = _boxes(center[a], axes[a], half[a], center[b], axes[b], half[b], margin, ids, values, n)
         else:
             n = _polygons(pa, pb, margin, ids, values, n)
-        for i in range(n - 1, -1, -1):
-            if ids[i, 0] >= 0:
-                break
-            ids[i, 0], ids[i, 1] = a, b
+        ids[start:n, 0], ids[start:n, 1] = a, b
     return n
 
 
 @numba.njit(cache=True, fastmath=False)
 def _store(ids, values, n, feature, point, normal, gap):  # type: ignore[no-untyped-def]
     """Write a contact without its shapes, which `_find` adds; return the new number of contacts."""
-    ids[n, 0], ids[n, 2] = -1, feature
-    values[n, :3], values[n, 3:6], values[n, 6] = point, normal, gap
+    ids[n, 2], values[n, :3], values[n, 3:6], values[n, 6] = feature, point, normal, gap
     return n + 1
 
 
@@ -382,8 +378,8 @@ def _clipped_face(center, axes, half, face, center_o, axes_o, half_o, sign, sepa
     i1, i2, side = (facing + 1) % 3, (facing + 2) % 3, -1.0 if over[facing] > 0.0 else 1.0
     middle = apart + side * half_o[facing] * axes_o[:, facing] - half[face] * m
     patch, lines, length = np.empty((16, 3)), np.empty((16, 2), np.int64), 4
-    for c in range(4):  # around the incident face; a corner lies on two of its edges, numbered 0 to 3
-        along, across = (1.0, 1.0, -1.0, -1.0)[c], (1.0, -1.0, -1.0, 1.0)[c]
+    # around the incident face; a corner lies on two of its edges, numbered 0 to 3
+    for c, (along, across) in enumerate(((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))):
         x = middle + along * half_o[i1] * axes_o[:, i1] + across * half_o[i2] * axes_o[:, i2]
         patch[c, 0], patch[c, 1], patch[c, 2] = np.sum(x * u), np.sum(x * w), np.sum(x * m)
         lines[c, 0], lines[c, 1] = (c + 3) % 4, c

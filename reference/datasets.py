@@ -57,16 +57,12 @@ class DatasetError(IapbError, ValueError):
 
 @dataclass(frozen=True)
 class StoredProblem:
-    """A problem file as read.
-
-    problem : the ImpactProblem; stored_impulse : (n,) multipliers in the file, or None
-    remark : text in the file; format : name of the format
-    """
+    """A problem file as read."""
 
     problem: ImpactProblem
-    stored_impulse: Floats | None = None
-    remark: str = ""
-    format: str = ""
+    stored_impulse: Floats | None = None  #: (n,) multipliers in the file
+    remark: str = ""  #: text in the file
+    format: str = ""  #: name of the format
 
 
 def read_problem(path: Path | str) -> StoredProblem:

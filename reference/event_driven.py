@@ -51,18 +51,14 @@ class LinearSystem:
 
 @dataclass(frozen=True)
 class ExactTrajectory:
-    """Arcs between events, which are parabolas.
+    """Arcs between events, which are parabolas."""
 
-    event_time : (k,) start of each arc [s], the first 0; q, v : (k, d) there, after the impact; a : (k, d)
-    impulse : (k, c) of the impact at the start of each arc [N s]; end : time up to which the motion is known [s]
-    """
-
-    event_time: Floats
-    q: Floats
-    v: Floats
-    a: Floats
-    impulse: Floats
-    end: float
+    event_time: Floats  #: (k,) start of each arc [s], the first 0
+    q: Floats  #: (k, d) there
+    v: Floats  #: (k, d) there, after the impact
+    a: Floats  #: (k, d) on the arc
+    impulse: Floats  #: (k, c) of the impact at the start of each arc [N s]
+    end: float  #: time up to which the motion is known [s]
 
     def state(self, time: ArrayLike) -> tuple[Floats, Floats]:
         """Return q and v (n, d) at the times (n,); at the instant of an event, those after it."""
@@ -79,22 +75,15 @@ def event_driven(
     system: LinearSystem, q: ArrayLike, v: ArrayLike, duration: float,
     law: Callable[[ImpactProblem], Outcome] = newton_lcp, most_events: int = 1000,
 ) -> ExactTrajectory:
-    """Return the motion from q, v (d,) for `duration` [s], or up to event number `most_events`.
-
-    An accumulation of impacts (a ball that comes to rest) ends the motion early; `end` is its last time.
+    """Return the motion from q, v (d,) for `duration` [s]; its arcs are exact at every time up to rounding.
 
     Parameters
     ----------
     system : constant mass matrix and force, gaps that are linear in q
     q, v : (d,) at the start, [m | rad] and their rates
-    duration : [s]
     law : impact law; by default Newton's as a linear complementarity problem
-    most_events : number of events after which the motion ends
-
-    Returns
-    -------
-    ExactTrajectory
-        The arcs between the events, which are exact at every time up to rounding.
+    most_events : number of events after which the motion ends early, as where impacts accumulate (a ball that comes to
+        rest); `end` is its last time
     """
     at, moving, now = np.array(q, np.float64), np.array(v, np.float64), 0.0
     free = np.asarray(np.linalg.solve(system.mass_matrix, system.force), np.float64)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numba
@@ -27,6 +27,7 @@ from iapb.lazy import needed
 from reference import Floats
 
 Rational = Any  # flint.fmpq_mat; named here because flint is imported only when used
+_flint = cache(partial(needed, "flint", "Exact arithmetic"))
 
 _SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose products are exact
 _ROUNDING = 2.0**-100  # bound of the error of one double-double operation, which is below 2^-102
@@ -36,21 +37,13 @@ _SMALLEST, _LARGEST = 1e-60, 1e60
 
 @dataclass(frozen=True)
 class ExactImpact:
-    """The result of (21) for the given numbers, without rounding.
+    """The result of (21) for the given numbers, without rounding."""
 
-    Attributes
-    ----------
-    velocity : v⁺, d fractions
-    generalized_impulse : M (v⁺ − v⁻), d fractions
-    independent_rows : indices of the rows Jₙ
-    energy_before, energy_after : kinetic energies [J]
-    """
-
-    velocity: tuple[Fraction, ...]
-    generalized_impulse: tuple[Fraction, ...]
-    independent_rows: tuple[int, ...]
-    energy_before: Fraction
-    energy_after: Fraction
+    velocity: tuple[Fraction, ...]  #: v⁺, d fractions
+    generalized_impulse: tuple[Fraction, ...]  #: M (v⁺ − v⁻), d fractions
+    independent_rows: tuple[int, ...]  #: indices of the rows Jₙ
+    energy_before: Fraction  #: kinetic energy [J]
+    energy_after: Fraction  #: kinetic energy [J]
 
     @property
     def rank(self) -> int:
@@ -72,11 +65,6 @@ def exact_impact(
     ----------
     mass_matrix, contact_jacobian, velocity : doubles or `fractions.Fraction`; M must be symmetric positive definite
     restitution : e, one for all rows
-
-    Returns
-    -------
-    ExactImpact
-        v⁺, the generalized impulse, the rows used, and the energies before and after, all as fractions.
 
     Raises
     ------
@@ -110,7 +98,7 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
     If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see `bulk_energy_gain`.
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
-    given = (rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus))
+    given = rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus)
     before, after = (_fractions(x.transpose() * mass * x)[0] for x in given)
     if before == 0:
         return 0.0 if after == 0 else np.inf
@@ -151,11 +139,6 @@ def rational_matrix(argument: str, value: ArrayLike, columns: int | None = None)
     return flint.fmpq_mat(*array.shape, [flint.fmpq(x.numerator, x.denominator) for x in fractions])
 
 
-@cache
-def _flint() -> Any:
-    return needed("flint", "Exact arithmetic")
-
-
 def _fractions(column: Rational) -> tuple[Fraction, ...]:
     return tuple(Fraction(int(x.p), int(x.q)) for x in column.entries())
 
@@ -171,17 +154,15 @@ def bulk_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLi
 
     Shapes: M (n, d, d) or (d, d), v⁻ and v⁺ (n, d). If KE⁻ is not positive, gain is NaN and bound infinity.
     """
-    before = np.atleast_2d(np.asarray(v_minus, dtype=np.float64))
-    after = np.atleast_2d(np.asarray(v_plus, dtype=np.float64))
-    masses = np.asarray(mass_matrix, dtype=np.float64)
-    n, d = before.shape
+    before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
+    masses, (n, d) = np.asarray(mass_matrix, np.float64), before.shape
     if after.shape != before.shape:
         raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
     if masses.shape not in ((d, d), (n, d, d)):
         raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
     for argument, array in (("mass_matrix", masses), ("v_minus", before), ("v_plus", after)):
         size = np.abs(array[array != 0.0])
-        if not np.isfinite(array).all() or (size.size and (size.max() > _LARGEST or size.min() < _SMALLEST)):
+        if not ((size >= _SMALLEST) & (size <= _LARGEST)).all():
             expected = f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
             raise ArgumentError(argument, array, expected)
     gain, bound = np.empty(n), np.empty(n)

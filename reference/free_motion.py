@@ -62,6 +62,5 @@ def _substep(mechanics: PinocchioMechanism, state: Floats, h: float) -> tuple[Fl
     # Orders five and three together, of order eight as in Hairer's program; their last coefficient is zero.
     fifth, third = (np.abs(weights[:-1] @ stages) for weights in (DOP853.E5, DOP853.E3))
     error = h * fifth * fifth / np.maximum(np.hypot(fifth, 0.1 * third), np.finfo(np.float64).tiny)
-    accurate = [part.max() <= _ACCURACY * np.abs(of).max()
-                for part, of in ((error[:nq], moved[:nq]), (error[nq:], moved[nq:]))]  # fmt: skip
-    return moved, all(accurate)
+    parts = slice(nq), slice(nq, None)
+    return moved, all(error[part].max() <= _ACCURACY * np.abs(moved[part]).max() for part in parts)

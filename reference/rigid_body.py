@@ -27,9 +27,7 @@ _TURNING = {"JointModelRUBZ": _CONTINUOUS, "JointModelSpherical": _SPHERICAL, "J
 _NO_BIAS, _MOTIONS = 1e-12, 4
 
 
-@cache
-def _pinocchio() -> Any:
-    return needed("pinocchio", "The rigid-body reference")
+_pinocchio = cache(partial(needed, "pinocchio", "The rigid-body reference"))
 
 
 class PinocchioMechanism:
@@ -37,14 +35,15 @@ class PinocchioMechanism:
 
     Parameters
     ----------
-    model : pinocchio.Model
-        It has one body frame per body, with the body's name.
+    model : a pinocchio.Model with one body frame per body, with the body's name
     """
 
     def __init__(self, model: Any) -> None:
         self.pin, self.model, self.data = _pinocchio(), model, model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
         self._below = np.tril_indices(self.nv, -1)
+        body = self.pin.FrameType.BODY  # frames of the bodies, in the mechanism's order; the first frame is the world
+        self._bodies = [k for k, frame in enumerate(model.frames) if k and frame.type == body]
 
     def mass_matrix(self, q: Floats) -> Floats:
         """Return M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
@@ -98,12 +97,6 @@ class PinocchioMechanism:
             rows[b] = self.pin.getFrameJacobian(self.model, self.data, frame, world).reshape(6, self.nv)
         return axes, origins, rows
 
-    @cached_property
-    def _bodies(self) -> list[int]:
-        """Frames of the bodies, in the mechanism's order."""
-        frames, body = self.model.frames, self.pin.FrameType.BODY
-        return [k for k in range(1, len(frames)) if frames[k].type == body]
-
     def kinetic_energy(self, q: Floats, v: Floats) -> float:
         """Return the kinetic energy [J]."""
         return float(self.pin.computeKineticEnergy(self.model, self.data, q, v))
@@ -132,9 +125,8 @@ class PinocchioMechanism:
     @cached_property
     def _layout(self) -> NDArray[np.int64]:
         """Class (-1: dq/dt = v), first coordinate and first velocity (n, 3) of the joints, and a last row of ends."""
-        joints = list(self.model.joints)[1:]
-        rows = [(_TURNING.get(joint.shortname(), -1), joint.idx_q, joint.idx_v) for joint in joints]
-        return np.array([*rows, (-1, self.nq, self.nv)], np.int64)
+        rows = [(_TURNING.get(joint.shortname(), -1), joint.idx_q, joint.idx_v) for joint in self.model.joints]
+        return np.array([*rows[1:], (-1, self.nq, self.nv)], np.int64)
 
     def free_acceleration(self, q: Floats, v: Floats) -> Floats:
         """Return dv/dt = −M⁻¹ B (d,) of the motion without forces, by the articulated body algorithm."""
@@ -155,14 +147,14 @@ class PinocchioMechanism:
 
     def calls(self) -> tuple[Callable[[Floats], Floats], Callable[[Floats, Floats], Floats]]:
         """Return Pinocchio's functions q -> M and (q, v) -> B + G, bound to the model, for timing."""
-        mass_matrix, inner_forces = self.pin.crba, self.pin.nonLinearEffects
-        return partial(mass_matrix, self.model, self.data), partial(inner_forces, self.model, self.data)
+        return (partial(self.pin.crba, self.model, self.data),
+                partial(self.pin.nonLinearEffects, self.model, self.data))  # fmt: skip
 
     def _index(self, body: str) -> int:
-        kind = self.pin.FrameType.BODY
-        if not self.model.existFrame(body, kind):
+        names = [self.model.frames[k].name for k in self._bodies]
+        if body not in names:
             raise ArgumentError("body", body, "the name of a body of the model")
-        return self._bodies.index(int(self.model.getFrameId(body, kind)))
+        return names.index(body)
 
 
 @numba.njit(cache=True, fastmath=False)

@@ -64,18 +64,12 @@ FRICTION_SOLVERS = ("nsgs", "pinocchio_admm", "cvxpy_socp")
 
 
 class RigidStep(NamedTuple):
-    """Result of one rigid step.
+    """Result of one rigid step."""
 
-    velocity : (d,) v⁺
-    impulse : (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
-    residual : recomputed natural-map residual of the step's LCP, relative to the velocities involved
-    restitution_law : "Newton" or "Poisson", the law that the step used
-    """
-
-    velocity: Floats
-    impulse: Floats
-    residual: float
-    restitution_law: str = NEWTON
+    velocity: Floats  #: (d,) v⁺
+    impulse: Floats  #: (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
+    residual: float  #: recomputed natural-map residual of the step's LCP, relative to the velocities involved
+    restitution_law: str = NEWTON  #: "Newton" or "Poisson", the law that the step used
 
 
 def rigid_step(
@@ -107,13 +101,12 @@ def rigid_step(
     if not poisson:
         try:
             newton = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
-        except SolverError:
-            if not bounces or np.count_nonzero(gap <= 0.0) < 2:
-                raise
-        else:
             # With e = 0 the step is a projection onto a set with v = 0, so it cannot gain energy.
             if not bounces or not _gains(newton, contact_jacobian, gamma_minus, v_free):
                 return newton
+        except SolverError:
+            if not bounces or np.count_nonzero(gap <= 0.0) < 2:
+                raise
     compression = velocity_bounds(gap, gamma_minus, 0.0, dt, stabilization if poisson else 0.0, scheme)
     compression = np.where(np.isfinite(bound), compression, -np.inf)
     compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, compression)
@@ -125,11 +118,9 @@ def rigid_step(
 
 
 def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_free: Floats) -> bool:
-    """Whether the works of the contacts, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), are both positive beyond rounding.
-
-    The scale includes γ_free, the effect of the load: at rest, γ⁻ is rounding error of either sign.
-    """
+    """Whether the works of the contacts, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), are both positive beyond rounding."""
     gamma_plus, gamma_free = contact_jacobian @ step.velocity, contact_jacobian @ v_free
+    # includes γ_free, the effect of the load: at rest, γ⁻ is rounding error of either sign
     size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_free) + np.abs(gamma_plus)))
     work = min(float(step.impulse @ (gamma + gamma_plus)) for gamma in (gamma_minus, gamma_free))
     return work > STEP_TOLERANCE * size
@@ -283,10 +274,8 @@ def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> F
                                               offset[mine].ravel(), 0.0, friction[mine], contact_size=size,
                                               relaxed=relaxed)  # fmt: skip
         found: list[Solution] = []
-        for solver in FRICTION_SOLVERS:
-            found.append(solve(problem, solver))
-            if found[-1].solved(CONVERGED):
-                break
+        while len(found) < len(FRICTION_SOLVERS) and not (found and found[-1].solved(CONVERGED)):
+            found.append(solve(problem, FRICTION_SOLVERS[len(found)]))
         best = found[-1] if found[-1].solved(CONVERGED) else min(found, key=lambda one: one.residuals.worst)
         if not best.solved(FRICTION_TOLERANCE):
             said = "; ".join(f"{x.solver}: residual {x.residuals.worst:.1e}, {x.note}" for x in found)

@@ -47,20 +47,13 @@ Contact = tuple[int, int, int]
 
 
 class Tolerances(NamedTuple):
-    """Tolerances of one computation.
+    """Tolerances of one computation."""
 
-    accuracy : tolerance of the integrator, far below the errors of time stepping (1e-3 to 1e-6)
-    closed : largest gap [m] of a closed contact: scenes place touching shapes to 1e-9, and event roots err by 1e-11
-    at_rest : largest normal velocity [m/s] of a contact at rest: a hundred times the integrator's error
-    released : share of the accelerations below which an acceleration counts as zero
-    steps : least number of steps in the whole duration
-    """
-
-    accuracy: float = 1e-11
-    closed: float = 1e-8
-    at_rest: float = 1e-9
-    released: float = 1e-8
-    steps: int = 20
+    accuracy: float = 1e-11  #: tolerance of the integrator, far below the errors of time stepping (1e-3 to 1e-6)
+    closed: float = 1e-8  #: largest gap [m] of a closed contact: scenes touch to 1e-9, and event roots err by 1e-11
+    at_rest: float = 1e-9  #: largest normal velocity [m/s] of a contact at rest: a hundred times the integrator's error
+    released: float = 1e-8  #: share of the accelerations below which an acceleration counts as zero
+    steps: int = 20  #: least number of steps in the whole duration
 
 
 COMPUTATIONS = (Tolerances(), Tolerances(1e-11, 3e-9, 3e-10, 3e-9, 31), Tolerances(1e-10, 3e-8, 3e-9, 3e-8, 23))
@@ -75,30 +68,22 @@ _AT_ONCE = 100  # most impacts at one instant: Newton's law can leave contacts t
 
 
 class Bound(NamedTuple):
-    """Error estimate of the motion: the largest differences between the computations plus the integrator's accuracy.
+    """Error estimate of the motion: the largest differences between the computations plus the integrator's accuracy."""
 
-    Position [m, rad] and velocity [m/s, rad/s] include the neglected bounces; instant [s] is that of the events.
-    """
-
-    position: float
-    velocity: float
-    instant: float
+    position: float  #: [m, rad], with the neglected bounces
+    velocity: float  #: [m/s, rad/s], with the neglected bounces
+    instant: float  #: of the events [s]
 
 
 @dataclass(frozen=True)
 class SceneTruth:
-    """The motion: q and v over time, the instants of its events, and its error estimate.
+    """The motion: q and v over time, the instants of its events, and its error estimate."""
 
-    segments : (start, stop, solution) with solution(t) -> (q, v, device q, device v)
-    coordinates, velocities : lengths of q and v
-    bound : estimate of the errors
-    """
-
-    coordinates: int
-    velocities: int
-    segments: tuple[tuple[float, float, Callable[[float], Floats]], ...]
-    events: tuple[float, ...]
-    bound: Bound = Bound(np.nan, np.nan, np.nan)
+    coordinates: int  #: length of q
+    velocities: int  #: length of v
+    segments: tuple[tuple[float, float, Callable[[float], Floats]], ...]  #: start, stop, t -> (q, v, device's q and v)
+    events: tuple[float, ...]  #: [s]
+    bound: Bound = Bound(np.nan, np.nan, np.nan)  #: estimate of the errors
 
     @property
     def end(self) -> float:
@@ -148,7 +133,7 @@ class _Motion:
         self.restitution = float(values[0]) if len(values) else scene.contact.restitution
         self.tool = slice(*self.system.tool_dofs)
         self.device = model_of(self.system.device_mechanism()) if coupled else None
-        self.drag = np.asarray(scene.device.damping if scene.device is not None and scene.device.damping else 0.0)
+        self.drag = np.asarray((scene.device and scene.device.damping) or 0.0)
 
     def split(self, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Return q, v, device q, device v of a state, with q normalised."""
@@ -160,13 +145,13 @@ class _Motion:
     def rows(self, q: Floats, v: Floats) -> dict[Contact, tuple[float, Floats]]:
         """Return gap and row (d,) of every candidate contact."""
         found = find_rows(self.system, q, v, np.inf)
-        names = zip(found.geometry.shape_a, found.geometry.shape_b, found.geometry.feature, strict=True)
-        return {(int(a), int(b), int(f)): (float(found.gap[i]), found.jacobian[i]) for i, (a, b, f) in enumerate(names)}
+        names = (column.tolist() for column in (found.geometry.shape_a, found.geometry.shape_b, found.geometry.feature))
+        return dict(zip(zip(*names, strict=True), zip(found.gap.tolist(), found.jacobian, strict=True), strict=True))
 
-    def _hand(self, mechanics: PinocchioMechanism, q: Floats, size: int) -> Floats:
+    def _hand(self, mechanics: PinocchioMechanism, q: Floats) -> Floats:
         hand = self.scene.hand
         if hand is None:
-            return np.zeros(size)
+            return np.zeros(mechanics.nv)
         rotation, origin = mechanics.placement(q, hand.body)
         point = origin + rotation @ np.array([*hand.point, 0.0])[:3]
         wrench = wrenches_of(self.scene, [0.0])[0]
@@ -179,7 +164,7 @@ class _Motion:
     def _here(self, state: Floats, names: list[Contact]) -> _Here:
         """Return dynamics and rows of the named contacts in a state, with J̇v by fourth-order differences."""
         q, v, device_q, device_v = self.split(state)
-        force = self._hand(self.mechanics, q, self.d) - self.mechanics.inner_forces(q, v, self.system.gravity)
+        force = self._hand(self.mechanics, q) - self.mechanics.inner_forces(q, v, self.system.gravity)
         force -= self.system.joint_damping * v
         if self.coupled:
             force[self.tool] += self._pull(device_q - q[self.tool], device_v - v[self.tool])
@@ -203,7 +188,7 @@ class _Motion:
         change = _least_change(here.mass, here.rows, -(here.rows @ here.free + here.drift))
         if self.device is None:
             return np.concatenate([self.mechanics.rate(q, v), here.free + change])
-        force = self._hand(self.device, device_q, len(device_q)) + (here.mass @ change)[self.tool]
+        force = self._hand(self.device, device_q) + (here.mass @ change)[self.tool]
         force += self._pull(q[self.tool] - device_q, v[self.tool] - device_v) - self.device.bias(device_q, device_v)
         force -= self.drag * device_v
         moved = np.linalg.solve(self.device.mass_matrix(device_q), force)
@@ -324,26 +309,23 @@ def scene_truth(
     ArgumentError
         `coupled` is used with quaternion or (cos, sin) coordinates, or without gains of the coupling.
     SolverError
-        There is no reference motion. The message says why: contacts overlap at the start, there are more events than
-        `most_events`, or a decision depends on a tolerance.
+        There is no reference: contacts overlap at the start, events exceed `most_events`, or depend on a tolerance.
     """
     motions = [_Motion(scene, coupled, tolerances, duration) for tolerances in computations]
     first, *others = (_compute(motion, most_events, start) for motion in motions)
-    for other in others:
-        if len(other.events) != len(first.events):
-            counts = f"{len(first.events)} or {len(other.events)} events"
-            raise SolverError(f"{scene.name}: no reference: {counts}, by tolerance")
+    counts = sorted({len(truth.events) for truth in (first, *others)})
+    if len(counts) > 1:
+        raise SolverError(f"{scene.name}: no reference: {counts[0]} or {counts[-1]} events, by tolerance")
     q, v = first.state(np.linspace(0.0, duration, 10 * _COMPARED))
     sizes = (max(1.0, float(np.abs(q).max())), max(1.0, float(np.abs(v).max())), duration)
     floor = [computations[0].accuracy * size for size in sizes]
     floor[0] += motions[0].widest + motions[0].bounced
     floor[1] += motions[0].bounced / duration
-    apart = [_apart(first, other) for other in others]
-    worst = [max(sizes) for sizes in zip((0.0, 0.0, 0.0), *apart, strict=True)]
+    worst = np.max([(0.0, 0.0, 0.0), *(_apart(first, other) for other in others)], axis=0).tolist()
     return replace(first, bound=Bound(*(a + b for a, b in zip(floor, worst, strict=True))))
 
 
-def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | None = None) -> SceneTruth:
+def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | None) -> SceneTruth:
     """Compute the motion with one set of tolerances."""
     q, v = start or motion.system.start
     device = [q[motion.tool], v[motion.tool]] if motion.coupled else []

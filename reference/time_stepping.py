@@ -39,16 +39,12 @@ SECONDS_A_STEP, SECONDS_AN_ENTRY = 1e-3, 3e-7
 
 
 class _Solved(NamedTuple):
-    """Result of a step with c contacts and d velocities.
+    """Result of a step with c contacts and d velocities; impulses in [N s]."""
 
-    velocity : (d,) v⁺; normal : (c,) impulses [N s]
-    tangential : (c, 3) impulses [N s], world axes; dragging : (d, c) generalized impulse of each of them
-    """
-
-    velocity: Floats
-    normal: Floats
-    tangential: Floats
-    dragging: Floats
+    velocity: Floats  # (d,) v⁺
+    normal: Floats  # (c,)
+    tangential: Floats  # (c, 3) in world axes
+    dragging: Floats  # (d, c) generalized impulse of each of them
 
 
 @dataclass(frozen=True)
@@ -91,6 +87,7 @@ class RigidConstraints:
         """All parameters of a step besides the scene, which gives the coefficients of restitution and friction."""
         return {**asdict(self), "restitution where Newton's law has no solution or gains energy": "Poisson"}
 
+    @one_thread()
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """Do one step (see `iapb.contact.laws.ContactLaw`).
 
@@ -105,10 +102,6 @@ class RigidConstraints:
             raise ArgumentError("scene", system.scene.name, f"at most {MOST_ENTRIES:,} numbers in the rows of a rigid "
                                 f"step; {cost.contacts:,} contacts of {cost.coordinates:,} coordinates have "
                                 f"{cost.contacts * cost.coordinates:,}. Fewer bodies, or the world IAPB")
-        with one_thread():
-            return self._advance(system, state, applied_force, dt)
-
-    def _advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         mechanics, q, v, g = mechanics_of(system), state.q.copy(), state.v.copy(), system.gravity
         mass = mechanics.mass_matrix(q)
         found = find_rows(system, q, v, self.margin)
@@ -129,17 +122,16 @@ class RigidConstraints:
             thrown = v + np.linalg.solve(mass, blow)
             moved = replace(found, gamma=found.jacobian @ thrown)
             step = self._solve(system, damped, q, thrown, force - damping * thrown, dt, moved)
-        normal = found.jacobian.T * step.normal
         impulse = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
-        pressing, dragging = (part[:, lasts].sum(axis=1) / dt for part in (normal, step.dragging))
+        pressing, dragging = (part[:, lasts].sum(axis=1) / dt
+                              for part in (found.jacobian.T * step.normal, step.dragging))  # fmt: skip
         blow, pushed = np.where(blows, struck.normal, 0.0), np.where(lasts, step.normal, 0.0)
         write_contacts(state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt)
         write_impact(state, system, v, mass, impulse, found.jacobian[blows])
         q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt)
         touches = ((found.gap <= 0.0) | (step.normal > 0.0)).any()
         contact_state = COLLIDING if blows.any() else RESTING if touches else FREE
-        dragging -= damping * step.velocity
-        return StepResult(q_plus, v_plus, pressing, dragging, impulse, contact_state)
+        return StepResult(q_plus, v_plus, pressing, dragging - damping * step.velocity, impulse, contact_state)
 
     def _solve(self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float,
                found: ContactRows) -> _Solved:  # fmt: skip

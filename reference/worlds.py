@@ -31,24 +31,18 @@ from reference.time_stepping import RigidConstraints
 
 # to add a world, add a line here
 WORLDS |= {
-    "ideal": lambda rendering: World("ideal", RigidConstraints(), "four-channel"),
-    "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
-    "ideal-friction": lambda rendering: World(
-        "ideal-friction", RigidConstraints(friction="coulomb"), "four-channel"
-    ),
+    "ideal": lambda _: World("ideal", RigidConstraints(), "four-channel"),
+    "CBuc": lambda _: World("CBuc", RigidConstraints(), "unilateral"),
+    "ideal-friction": lambda _: World("ideal-friction", RigidConstraints(friction="coulomb"), "four-channel"),
 }
 
 
+@one_thread()  # entered once for all steps of a rigid world
 def run_world(
-    scene: Scene | str | Path,
-    name: str,
-    rendering: str = "full",
-    progress: Callable[[int, int], None] | None = None,
-    *,
-    partial: bool = False,
-    **options: Any,
+    scene: Scene | str | Path, name: str, rendering: str = "full",
+    progress: Callable[[int, int], None] | None = None, *, partial: bool = False, **options: Any,
 ) -> Run:
-    """Simulate a scene in a world.
+    """Simulate a scene in a world and return its Run.
 
     Parameters
     ----------
@@ -57,10 +51,6 @@ def run_world(
     progress : called as progress(steps done, total steps) after every chunk
     partial : whether to return a run that stopped early; if False, an exception is raised instead
     options : as `iapb.simulate` takes them
-
-    Returns
-    -------
-    Run
 
     Raises
     ------
@@ -72,9 +62,8 @@ def run_world(
     if not isinstance(scene, Scene):
         scene = load_scene(find_scene(scene))
     world = find_world(name, rendering)
-    with one_thread():  # entered once for all steps of a rigid world
-        run = simulate(scene, world.law, world.coupling_in(scene), world=label_of(name, rendering), progress=progress,
-                       **options)  # fmt: skip
+    run = simulate(scene, world.law, world.coupling_in(scene), world=label_of(name, rendering), progress=progress,
+                   **options)  # fmt: skip
     return run if partial else require_complete(run)
 
 

@@ -17,29 +17,25 @@ from reference import Floats
 # Residual, as a share of |L⁻¹ Jᵀp|, below which a non-negative impulse exists: the active-set least squares ends near
 # 1e-13 for a consistent problem and far above for an inconsistent one.
 EXPLAINED = 1e-9
+ROUNDING = 1e-12  # share of the largest impulse below which a negative one counts as rounding error
 NONE, ARTEFACT, ADHESIVE = "none", "artefact of the minimum norm", "adhesive"
 
 
 @dataclass(frozen=True)
 class NonNegativeImpulse:
-    """Non-negative impulses whose Jᵀp is nearest to a generalized impulse.
+    """Non-negative impulses whose Jᵀp is nearest to a generalized impulse."""
 
-    impulse : (c,) p >= 0 [N s]; residual : |L⁻¹(Jᵀp − given)| / |L⁻¹ given| in the kinetic metric
-    exists : whether the residual is zero up to rounding, so that p gives the same motion without pulling
-    """
-
-    impulse: Floats
-    residual: float
+    impulse: Floats  #: (c,) p >= 0 [N s]
+    residual: float  #: |L⁻¹(Jᵀp − given)| / |L⁻¹ given| in the kinetic metric
 
     @property
     def exists(self) -> bool:
-        """Whether p reproduces the generalized impulse."""
+        """Whether the residual is zero up to rounding, so that p gives the same motion without pulling."""
         return self.residual <= EXPLAINED
 
 
-def nonnegative_impulse(
-    contact_jacobian: ArrayLike, generalized_impulse: ArrayLike, mass_matrix: ArrayLike
-) -> NonNegativeImpulse:
+def nonnegative_impulse(contact_jacobian: ArrayLike, generalized_impulse: ArrayLike,
+                        mass_matrix: ArrayLike) -> NonNegativeImpulse:  # fmt: skip
     """Return p >= 0 with Jᵀp nearest to `generalized_impulse` (d,), for J (c, d) and M (d, d).
 
     Source: Lawson and Hanson, Solving Least Squares Problems (1974), by `scipy.optimize.nnls`.
@@ -67,15 +63,10 @@ def nonnegative_impulse(
     return NonNegativeImpulse(scaled * size / unit, float(residual))
 
 
-def adhesion(
-    contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: ArrayLike, tolerance: float = 1e-12
-) -> str:
-    """Return NONE, ARTEFACT or ADHESIVE for impulses (c,) of any law.
-
-    A negative impulse smaller than `tolerance` times the largest one counts as rounding error.
-    """
+def adhesion(contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: ArrayLike) -> str:
+    """Return NONE, ARTEFACT or ADHESIVE for impulses (c,) of any law."""
     p = np.asarray(impulses, np.float64)
-    if p.min(initial=0.0) >= -tolerance * np.abs(p).max(initial=0.0):
+    if p.min(initial=0.0) >= -ROUNDING * np.abs(p).max(initial=0.0):
         return NONE
     given = np.asarray(contact_jacobian, np.float64).T @ p
     return ARTEFACT if nonnegative_impulse(contact_jacobian, given, mass_matrix).exists else ADHESIVE

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -31,12 +32,12 @@ class SolverRow:
     problem: str
     size: int
     solver: str
-    verdict: str
-    residuals: Residuals
-    seconds: float
-    spread: float
     asymmetry: float
+    verdict: str
     note: str
+    residuals: Residuals = Residuals()
+    seconds: float = np.nan
+    spread: float = np.nan
 
 
 def run_solvers(
@@ -54,27 +55,25 @@ def run_solvers(
     for problem in problems:
         asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
         found: list[Solution] = []
-        missing, left_out = [], []
+        missing: list[SolverRow] = []
+        left_out: list[SolverRow] = []
         for name in solvers or solver_names(problem):
+            row = partial(SolverRow, problem.name, problem.size, name, asymmetry)
             if name in slow:
-                left_out.append((name, "left out", f"left out: {slow[name]:.3g} s for a problem before"))
+                left_out.append(row("left out", f"left out: {slow[name]:.3g} s for a problem before"))
                 continue
             if progress is not None:
                 progress(problem.name, name)
             try:
                 found.append(min((solve(problem, name) for _ in range(repeats)), key=lambda s: s.seconds))
             except MissingDependencyError as error:
-                missing.append((name, "missing", str(error)))
+                missing.append(row("missing", str(error)))
         best = min(found, key=lambda s: s.residuals.worst, default=None)
         for s in found:
-            spread = np.nan
-            if best is not None and s.solved(tolerance):
-                difference = np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0)
-                spread = float(difference / velocity_scale(problem))
-            rows.append(SolverRow(problem.name, problem.size, s.solver, s.verdict(tolerance), s.residuals, s.seconds,
-                                  spread, asymmetry, s.note))  # fmt: skip
-        rows += [SolverRow(problem.name, problem.size, name, verdict, Residuals(), np.nan, np.nan, asymmetry, note)
-                 for name, verdict, note in missing + left_out]  # fmt: skip
+            apart = np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0) if best and s.solved(tolerance) else np.nan
+            rows.append(SolverRow(problem.name, problem.size, s.solver, asymmetry, s.verdict(tolerance), s.note,
+                                  s.residuals, s.seconds, float(apart / velocity_scale(problem))))  # fmt: skip
+        rows += missing + left_out
         slow.update({s.solver: s.seconds for s in found if s.seconds > longest})
     return rows
 

@@ -28,14 +28,11 @@ LADDER = ("daqp", "quadprog", "lemke", "gauss_seidel")
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a law for an impact.
+    """Result of a law for an impact."""
 
-    velocity : (d,) v⁺; impulse : (n,) p [N s]; residual : largest recomputed residual of the problems solved
-    """
-
-    velocity: Floats
-    impulse: Floats
-    residual: float = 0.0
+    velocity: Floats  #: (d,) v⁺
+    impulse: Floats  #: (n,) p [N s]
+    residual: float = 0.0  #: largest recomputed residual of the problems solved
 
 
 @dataclass(frozen=True)
@@ -94,14 +91,12 @@ def newton_equality(problem: ImpactProblem) -> Outcome:
 
 def coulomb_ncp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
     """Apply Coulomb's law K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals."""
-    impulse, residual = _solved(replace(problem, relaxed=False), solver)
-    return Outcome(problem.velocity_plus(impulse), impulse, residual)
+    return newton_lcp(replace(problem, relaxed=False), solver)
 
 
 def coulomb_ccp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
     """Apply K ∋ p ⟂ u ∈ K*, Coulomb's law without the shift, which is a convex program."""
-    impulse, residual = _solved(replace(problem, relaxed=True), solver)
-    return Outcome(problem.velocity_plus(impulse), impulse, residual)
+    return newton_lcp(replace(problem, relaxed=True), solver)
 
 
 def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
@@ -111,11 +106,9 @@ def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
 
 
 def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:
-    """Return p (n,) and its recomputed residual, by that solver or the first of LADDER that reaches LAW_TOLERANCE.
-
-    The residual is relative to `speed` [m/s] if the problem's own velocities are smaller. After compression, only
-    rounding errors may be left, and opposed rows may contradict each other in them.
-    """
+    """Return p (n,) and its recomputed residual, by that solver or the first of LADDER that reaches LAW_TOLERANCE."""
+    # Relative to `speed` [m/s] if the problem's own velocities are smaller: after compression, only rounding errors may
+    # be left, and opposed rows may contradict each other in them.
     said, own = [], velocity_scale(problem)
     for name in LADDER if solver is None else (solver,):
         solution = solve(problem, name)

@@ -30,31 +30,19 @@ INDEFINITE_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class ImpactProblem:
-    """A contact problem with n = contacts x contact_size unknown impulses p [N s].
+    """A contact problem with n = contacts x contact_size unknown impulses p [N s]."""
 
-    Attributes
-    ----------
-    delassus : (n, n) W = J M⁻¹ Jᵀ [1/kg]
-    gamma_minus : (n,) contact velocities J v⁻ before the impact [m/s]; normals > 0 separate
-    restitution : (k,) Newton's e of each contact, in [0, 1]; it is ignored for joints
-    friction : (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
-    contact_size : components per contact, normal first: 1, 2 (planar friction) or 3
-    relaxed : True drops the shift mu |u_T| from Coulomb's law (convex relaxation)
-    bilateral : (k,) True for blocks of joints, or None
-    mass_matrix, contact_jacobian, velocity : the mechanics (d, d), (n, d), (d,), if known
-    """
-
-    delassus: Floats
-    gamma_minus: Floats
-    restitution: Floats
-    friction: Floats | None = None
-    contact_size: int = 1
-    relaxed: bool = False
+    delassus: Floats  #: (n, n) W = J M⁻¹ Jᵀ [1/kg]
+    gamma_minus: Floats  #: (n,) contact velocities J v⁻ before the impact [m/s]; normals > 0 separate
+    restitution: Floats  #: (k,) Newton's e of each contact, in [0, 1]; it is ignored for joints
+    friction: Floats | None = None  #: (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
+    contact_size: int = 1  #: components per contact, normal first: 1, 2 (planar friction) or 3
+    relaxed: bool = False  #: True drops the shift mu |u_T| from Coulomb's law (convex relaxation)
     name: str = ""
-    mass_matrix: Floats | None = None
+    mass_matrix: Floats | None = None  #: the mechanics (d, d), (n, d), (d,), if known
     contact_jacobian: Floats | None = None
     velocity: Floats | None = None
-    bilateral: NDArray[np.bool_] | None = None
+    bilateral: NDArray[np.bool_] | None = None  #: (k,) True for blocks of joints
 
     @classmethod
     def from_impact(
@@ -128,10 +116,9 @@ class ImpactProblem:
         if self.asymmetry > SYMMETRY_TOLERANCE:
             raise SolverError(f"refused: W is asymmetric (relative {self.asymmetry:.1e}), not convex")
         eigenvalues, vectors = np.linalg.eigh(0.5 * (self.delassus + self.delassus.T))
-        largest = np.abs(eigenvalues).max(initial=0.0)
-        if eigenvalues.min(initial=0.0) < -INDEFINITE_TOLERANCE * largest:
-            ratio = eigenvalues.min() / largest
-            raise SolverError(f"refused: W is indefinite (relative eigenvalue {ratio:.1e}), not convex")
+        least, largest = eigenvalues.min(initial=0.0), np.abs(eigenvalues).max(initial=0.0)
+        if least < -INDEFINITE_TOLERANCE * largest:
+            raise SolverError(f"refused: W is indefinite (relative eigenvalue {least / largest:.1e}), not convex")
         return np.asarray(vectors * np.sqrt(np.clip(eigenvalues, 0.0, None)))
 
     def contact_velocity(self, impulse: Floats) -> Floats:

@@ -21,32 +21,22 @@ SOLVED_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Answer:
-    """Return value of a solver module: impulse (n,) [N s] or None, and the solver's message.
-
-    refused : True if the solver does not accept this kind of problem
-    seconds : time [s] if the solver measures it itself
-    """
+    """Return value of a solver module: impulse (n,) [N s] or None, and the solver's message."""
 
     impulse: Floats | None
     note: str = ""
-    refused: bool = False
-    seconds: float | None = None
+    refused: bool = False  #: the solver does not accept this kind of problem
+    seconds: float | None = None  #: time [s] if the solver measures it itself
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """Residuals of an impulse, relative to the velocity scale; inf = unknown.
+    """Residuals of an impulse, relative to the velocity scale; inf = unknown."""
 
-    impulse_cone : distance of the scaled impulse from its cone (without friction: adhesive impulses)
-    velocity_cone : distance of the complementary velocity from the dual cone (penetrating velocities)
-    complementarity : largest |p_i · w_i| of a contact
-    natural_map : largest component of p - proj_K(p - w), which is zero only at solutions
-    """
-
-    impulse_cone: float = np.inf
-    velocity_cone: float = np.inf
-    complementarity: float = np.inf
-    natural_map: float = np.inf
+    impulse_cone: float = np.inf  #: distance of the scaled impulse from its cone (without friction: adhesive impulses)
+    velocity_cone: float = np.inf  #: distance of the complementary velocity from the dual cone (penetrating velocities)
+    complementarity: float = np.inf  #: largest |p_i · w_i| of a contact
+    natural_map: float = np.inf  #: largest component of p - proj_K(p - w), which is zero only at solutions
 
     @property
     def worst(self) -> float:
@@ -56,23 +46,14 @@ class Residuals:
 
 @dataclass(frozen=True)
 class Solution:
-    """An answer to an ImpactProblem.
-
-    Attributes
-    ----------
-    impulse : (n,) p [N s], or None if the solver returned none
-    solver : name in the table of solvers
-    note : the solver's message, which is shown but not used for the verdict
-    refused : True if the solver does not accept this kind of problem
-    seconds : wall time of the call [s]
-    """
+    """An answer to an ImpactProblem."""
 
     problem: ImpactProblem
-    impulse: Floats | None
-    solver: str = ""
-    note: str = ""
-    refused: bool = False
-    seconds: float = np.nan
+    impulse: Floats | None  #: (n,) p [N s], or None if the solver returned none
+    solver: str = ""  #: name in the table of solvers
+    note: str = ""  #: the solver's message, which is shown but not used for the verdict
+    refused: bool = False  #: the solver does not accept this kind of problem
+    seconds: float = np.nan  #: wall time of the call
 
     @cached_property
     def residuals(self) -> Residuals:
@@ -86,9 +67,7 @@ class Solution:
 
     def verdict(self, tolerance: float = SOLVED_TOLERANCE) -> str:
         """Return "solved", "refused" or "failed"."""
-        if self.solved(tolerance):
-            return "solved"
-        return "refused" if self.refused else "failed"
+        return "solved" if self.solved(tolerance) else "refused" if self.refused else "failed"
 
     def answer(self) -> Floats:
         """Return the impulse (n,), or NaN if there is none."""

@@ -45,19 +45,16 @@ class Cuboid:
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A free body; its origin is the centre of mass, and its axes are principal axes.
-
-    mass [kg], inertia: three principal moments [kg m2], velocity [m/s] and spin [rad/s] in world axes
-    """
+    """A free body; its origin is the centre of mass, and its axes are principal axes."""
 
     name: str
-    mass: float
-    inertia: Vector
+    mass: float  #: [kg]
+    inertia: Vector  #: three principal moments [kg m2]
     shapes: tuple[Sphere | Cuboid, ...]
     position: Vector
     orientation: Quaternion = UPRIGHT
-    velocity: Vector = ORIGIN
-    spin: Vector = ORIGIN
+    velocity: Vector = ORIGIN  #: [m/s] in world axes
+    spin: Vector = ORIGIN  #: [rad/s] in world axes
 
 
 @dataclass(frozen=True)
@@ -78,27 +75,22 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class FixedScene:
-    """One scene of the set, and the known facts of its motion.
-
-    law : the condition that the motion must satisfy, in words
-    final_velocities : (bodies, 3) world axes, after the last impact; None for a scene that stays at rest
-    length : size of the bodies [m], the scale of overlaps
-    """
+    """One scene of the set, and the known facts of its motion."""
 
     name: str
     title: str
-    law: str
+    law: str  #: the condition that the motion must satisfy, in words
     bodies: tuple[RigidBody, ...]
     obstacles: tuple[Obstacle, ...]
     restitution: float
     duration: float
-    length: float
+    length: float  #: size of the bodies [m], the scale of overlaps
     gravity: Vector = ORIGIN
-    final_velocities: tuple[Vector, ...] | None = None
+    final_velocities: tuple[Vector, ...] | None = None  #: (bodies, 3) world axes, after the last impact
 
     @property
     def rests(self) -> bool:
-        """Whether the bodies must stay in place."""
+        """Whether the bodies must stay in place, and final velocities are None."""
         return self.final_velocities is None
 
     @property

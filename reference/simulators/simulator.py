@@ -21,16 +21,11 @@ LOWEST = 0.14  # e of a nearly critically damped spring; below it there is no ha
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of an engine for a scene.
+    """Settings of an engine for a scene."""
 
-    step : the longest step [s]; an integrator with error control may take shorter ones
-    options : all other relevant settings, by the engine's own names
-    note : what the engine cannot do, and what replaces it
-    """
-
-    step: float
-    options: Mapping[str, str | float] = field(default_factory=dict)
-    note: str = ""
+    step: float  #: the longest step [s]; an integrator with error control may take shorter ones
+    options: Mapping[str, str | float] = field(default_factory=dict)  #: other settings, by the engine's own names
+    note: str = ""  #: what the engine cannot do, and what replaces it
 
     def __str__(self) -> str:
         """Return the settings on one line."""

@@ -15,18 +15,14 @@ SAMPLE_INTERVAL = 1e-3  # [s] interval of kept states; longer steps are all kept
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Sampled motion at n instants of b bodies, in world axes.
+    """Sampled motion at n instants of b bodies, in world axes."""
 
-    time (n,) [s]; position (n, b, 3) [m]; orientation (n, b, 4) x, y, z, w; velocity (n, b, 3) [m/s];
-    spin (n, b, 3) [rad/s]; contacts (n,) number of touching points that the engine reports, −1 if it reports none
-    """
-
-    time: Floats
-    position: Floats
-    orientation: Floats
-    velocity: Floats
-    spin: Floats
-    contacts: NDArray[np.int64]
+    time: Floats  #: (n,) [s]
+    position: Floats  #: (n, b, 3) [m]
+    orientation: Floats  #: (n, b, 4) x, y, z, w
+    velocity: Floats  #: (n, b, 3) [m/s]
+    spin: Floats  #: (n, b, 3) [rad/s]
+    contacts: NDArray[np.int64]  #: (n,) number of touching points that the engine reports, −1 if it reports none
 
     @property
     def finite(self) -> bool:

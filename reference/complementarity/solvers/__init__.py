@@ -24,17 +24,14 @@ from reference.complementarity.solution import Answer, Solution
 
 @dataclass(frozen=True)
 class SolverEntry:
-    """A solver: its module, the packages it needs, its method and the problems it accepts.
-
-    `takes`: "lcp" = any frictionless problem, "convex" = only symmetric semidefinite W, "cone" = friction.
-    """
+    """A solver: its module, the packages it needs, its method and the problems it accepts."""
 
     module: str
     package: str
     method: str
-    takes: str
-    bilateral: bool = False  # accepts two-sided rows as well
-    option: str = ""  # argument of the module's solve if it serves several solvers
+    takes: str  #: "lcp" = any frictionless problem, "convex" = only symmetric semidefinite W, "cone" = friction
+    bilateral: bool = False  #: accepts two-sided rows as well
+    option: str = ""  #: argument of the module's solve if it serves several solvers
 
 
 _HERE = "reference.complementarity.solvers"
@@ -87,7 +84,12 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
     call = _load(solver, entry)
     started = time.perf_counter()
     try:
-        answer = _known_without_solver(problem, entry) or call(problem, *filter(None, [entry.option]))
+        if (entry.takes == "cone") != (problem.friction is not None):
+            kind = "problems with friction" if entry.takes == "cone" else "frictionless problems"
+            raise SolverError(f"refused: takes {kind} only")
+        if problem.two_sided.any() and not entry.bilateral:
+            raise SolverError("refused: takes one-sided contacts only")
+        answer = call(problem, *filter(None, [entry.option])) if problem.size else Answer(np.zeros(0), "no contacts")
     except SolverError as error:
         answer = Answer(None, str(error), refused=str(error).startswith("refused"))
     except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:  # raised inside a foreign package
@@ -126,13 +128,3 @@ def _load(solver: str, entry: SolverEntry) -> Callable[..., Answer]:
         module.start()
     found: Callable[..., Answer] = module.solve
     return found
-
-
-def _known_without_solver(problem: ImpactProblem, entry: SolverEntry) -> Answer | None:
-    """Answer without the solver: refuse a problem of the wrong kind, or solve one without contacts; else None."""
-    if (entry.takes == "cone") != (problem.friction is not None):
-        kind = "frictionless problems only" if entry.takes != "cone" else "problems with friction only"
-        return Answer(None, f"refused: takes {kind}", refused=True)
-    if problem.two_sided.any() and not entry.bilateral:
-        return Answer(None, "refused: takes one-sided contacts only", refused=True)
-    return Answer(np.zeros(0), "no contacts") if problem.size == 0 else None

@@ -40,13 +40,9 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
         return _by_cvxpy(problem, method)
     if method == "proxqp":
         return _by_proxqp(problem)
-    factor = problem.factor
-    try:
-        if method == "daqp":
-            return Answer(daqp(factor, problem.offset, problem.two_sided), "daqp: optimal")
-        return Answer(quadprog(factor, problem.offset), "quadprog: optimal")
-    except SolverError as error:
-        return Answer(None, str(error))
+    if method == "daqp":
+        return Answer(daqp(problem.factor, problem.offset, problem.two_sided), "daqp: optimal")
+    return Answer(quadprog(problem.factor, problem.offset), "quadprog: optimal")
 
 
 def daqp(rows: Floats, offset: Floats, bilateral: NDArray[np.bool_] | None = None) -> Floats:
