@@ -181,9 +181,8 @@ def _rates(layout, q, v):  # type: ignore[no-untyped-def]
 
 def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioMechanism:
     """Read a URDF file by Pinocchio's own parser."""
-    pinocchio = _pinocchio()
-    root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
-    return PinocchioMechanism(pinocchio.buildModelFromUrdf(str(path), *root))
+    root = (_pinocchio().JointModelFreeFlyer(),) if floating_base else ()
+    return PinocchioMechanism(_pinocchio().buildModelFromUrdf(str(path), *root))
 
 
 def model_of(mechanism: Mechanism) -> PinocchioMechanism:
@@ -246,11 +245,10 @@ def impulse_dynamics(
     restitution : in [-1, 1]
     """
     pinocchio = _pinocchio()
-    mass, rows = np.array(mass_matrix, np.float64), np.array(contact_jacobian, np.float64)
-    v = np.array(velocity, np.float64)
+    rows, v = np.array(contact_jacobian, np.float64), np.array(velocity, np.float64)
     model = pinocchio.Model()
     for k in range(len(v)):
         model.addJoint(k, pinocchio.JointModelPX(), pinocchio.SE3.Identity(), f"joint {k}")
     data = model.createData()
-    data.M[:, :] = mass
+    data.M[:, :] = mass_matrix
     return np.array(pinocchio.impulseDynamics(model, data, v, rows, restitution, 0.0))

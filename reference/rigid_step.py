@@ -140,7 +140,7 @@ def nearest_velocity(mass_matrix: Floats, v_free: Floats, contact_jacobian: Floa
     scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
     for name, solver in STEP_SOLVERS.items():
         if name == "gauss_seidel" and "infeasible" in said[0]:
-            continue
+            break
         try:
             p = solver(rows, offset)
         except SolverError as error:
@@ -243,11 +243,10 @@ def friction_step(
     SolverError
         No solver reaches FRICTION_TOLERANCE; the message gives the number of contacts and each solver's text.
     """
-    count, size = tangent_rows.shape[0], 1 + tangent_rows.shape[1]
-    mu = np.broadcast_to(np.asarray(friction, np.float64), count)
     blocks = np.concatenate([normal_rows[:, None], tangent_rows], axis=1)
-    impulse, velocity = np.zeros((count, size)), v_free
-    taken = np.zeros(count, np.bool_)
+    count, size = blocks.shape[:2]
+    mu = np.broadcast_to(np.asarray(friction, np.float64), count)
+    impulse, velocity, taken = np.zeros((count, size)), v_free, np.zeros(count, np.bool_)
     while (closing := ~taken & (normal_rows @ velocity < bound)).any():
         taken |= closing
         rows = blocks[taken].reshape(-1, len(v_free))
@@ -260,10 +259,7 @@ def friction_step(
 
 
 def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> Floats:
-    """Return p (k, size) for W (k size, k size) and offset (k, size) [m/s], island by island.
-
-    Each island has the first solution that converges, else the best one if it reaches FRICTION_TOLERANCE.
-    """
+    """Return p (k, size) for offset (k, size) [m/s]: of each island, the first that converges, or the best."""
     from scipy.sparse.csgraph import connected_components
 
     count, size = offset.shape

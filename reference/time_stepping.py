@@ -19,15 +19,7 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene.mechanism import restitution_by_pair
-from reference import Floats
-from reference.contact_rows import (
-    ContactRows,
-    find_rows,
-    mechanics_of,
-    tangent_rows,
-    write_contacts,
-    write_impact,
-)
+from reference import Floats, contact_rows
 from reference.free_motion import free_motion
 from reference.one_thread import one_thread
 from reference.rigid_step import FRICTION_LAWS, SCHEMES, friction_step, rigid_step, velocity_bounds
@@ -79,8 +71,8 @@ class RigidConstraints:
     @property
     def uses(self) -> frozenset[str]:
         """Parts of the scene that the law uses: restitution, joints, and friction unless `friction` is "none"."""
-        friction = {FRICTION, IMPACT_FRICTION} if self.friction != "none" else set()
-        return frozenset({OWN_RESTITUTION, JOINTS} | friction)
+        friction = () if self.friction == "none" else (FRICTION, IMPACT_FRICTION)
+        return frozenset((OWN_RESTITUTION, JOINTS, *friction))
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -102,9 +94,9 @@ class RigidConstraints:
             raise ArgumentError("scene", system.scene.name, f"at most {MOST_ENTRIES:,} numbers in the rows of a rigid "
                                 f"step; {cost.contacts:,} contacts of {cost.coordinates:,} coordinates have "
                                 f"{cost.contacts * cost.coordinates:,}. Fewer bodies, or the world IAPB")
-        mechanics, q, v, g = mechanics_of(system), state.q.copy(), state.v.copy(), system.gravity
+        mechanics, q, v, g = contact_rows.mechanics_of(system), state.q.copy(), state.v.copy(), system.gravity
         mass = mechanics.mass_matrix(q)
-        found = find_rows(system, q, v, self.margin)
+        found = contact_rows.find_rows(system, q, v, self.margin)
         # B belongs to the free motion after the forces; where it is zero, its rounding errors keep their old place.
         inner = mechanics.gravity(q, g) if mechanics.has_bias else mechanics.inner_forces(q, v, g)
         force = applied_force - inner
@@ -126,15 +118,15 @@ class RigidConstraints:
         pressing, dragging = (part[:, lasts].sum(axis=1) / dt
                               for part in (found.jacobian.T * step.normal, step.dragging))  # fmt: skip
         blow, pushed = np.where(blows, struck.normal, 0.0), np.where(lasts, step.normal, 0.0)
-        write_contacts(state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt)
-        write_impact(state, system, v, mass, impulse, found.jacobian[blows])
+        contact_rows.write_contacts(state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt)
+        contact_rows.write_impact(state, system, v, mass, impulse, found.jacobian[blows])
         q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt)
         touches = ((found.gap <= 0.0) | (step.normal > 0.0)).any()
         contact_state = COLLIDING if blows.any() else RESTING if touches else FREE
         return StepResult(q_plus, v_plus, pressing, dragging - damping * step.velocity, impulse, contact_state)
 
     def _solve(self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float,
-               found: ContactRows) -> _Solved:  # fmt: skip
+               found: contact_rows.ContactRows) -> _Solved:  # fmt: skip
         (classes, table), values, shapes = system.frictions, system.restitutions, found.geometry[:2]
         e: float | Floats = float(values[0]) if len(values) else float(system.scene.contact.restitution)
         if len(values) > 1:  # pairs that can touch differ: one e for each contact
@@ -145,7 +137,7 @@ class RigidConstraints:
             return _Solved(step.velocity, step.impulse, np.zeros((len(found.gap), 3)), np.zeros_like(found.jacobian.T))
         mu = table[classes[shapes[0]], classes[shapes[1]]]
         bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
-        tangents, rows = tangent_rows(system, q, found)
+        tangents, rows = contact_rows.tangent_rows(system, q, found)
         v_free, relaxed = v + dt * np.linalg.solve(mass, force), self.friction == "relaxed"
         velocity, normal, slip = friction_step(mass, v_free, found.jacobian, rows, bound, mu, relaxed)
         along, dragging = np.einsum("csx,cs->cx", tangents, slip), np.einsum("csd,cs->dc", rows, slip)
@@ -178,16 +170,13 @@ def cost_of(system: Any) -> Cost:
     return Cost(contacts, d, SECONDS_A_STEP + SECONDS_AN_ENTRY * contacts * d)
 
 
-def _blows(mass: Floats, found: ContactRows, impulse: Floats, approach_velocity: float) -> NDArray[np.bool_]:
-    """Return the contacts (c,) of the collision: approaching ones, and pushing ones connected to them (W_ij ≠ 0).
-
-    Without the connected contacts, the inner contacts of a cradle would act by forces and not by impulses, and the
-    impact considered alone could gain energy.
-    """
+def _blows(mass: Floats, found: contact_rows.ContactRows, impulse: Floats, approach: float) -> NDArray[np.bool_]:
+    """Return the contacts (c,) of the collision: approaching ones, and pushing ones connected to them (W_ij ≠ 0)."""
     from scipy.sparse.csgraph import connected_components
 
+    # Without connected contacts, inner ones of a cradle would act by forces, and the impact alone could gain energy.
     pushes = impulse > 0.0
-    struck = pushes & (found.gamma < -approach_velocity)
+    struck = pushes & (found.gamma < -approach)
     if not struck.any() or np.array_equal(struck, pushes):
         return struck
     rows = found.jacobian[pushes]

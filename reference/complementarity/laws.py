@@ -3,6 +3,9 @@
 All laws act on an ImpactProblem with known mechanics (`ImpactProblem.from_impact`) with E = diag(restitution), and
 return v⁺ and the impulses. The equality laws share no algorithm with the engine: they solve A x = target by singular
 values (lstsq), while the engine orthogonalises rows.
+
+With redundant contacts, many p give the same generalized impulse Jᵀp. A negative entry of the minimum-norm p alone does
+not mean adhesion: the contacts pull only if *no* p >= 0 gives the same Jᵀp.
 """
 
 from __future__ import annotations
@@ -24,6 +27,11 @@ LAW_TOLERANCE = 1e-9
 # Solvers for a frictionless LCP, tried in this order. For some redundant rows, active sets cycle and Lemke ends
 # on a ray; projections (Gauss-Seidel) do not, but may be slow. Each solution's residual is recomputed.
 LADDER = ("daqp", "quadprog", "lemke", "gauss_seidel")
+# Residual, as a share of |L⁻¹ Jᵀp|, below which a non-negative impulse exists: the active-set least squares ends near
+# 1e-13 for a consistent problem and far above for an inconsistent one.
+EXPLAINED = 1e-9
+ROUNDING = 1e-12  # share of the largest impulse below which a negative one counts as rounding error
+NONE, ARTEFACT, ADHESIVE = "none", "artefact of the minimum norm", "adhesive"
 
 
 @dataclass(frozen=True)
@@ -103,6 +111,57 @@ def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
     """Return the rows nᵀJ_a and nᵀJ_b of (13)-(14) (each (c, d)), without zero rows; (12) has their difference."""
     stacked = np.vstack([np.asarray(jacobian_a, np.float64), np.asarray(jacobian_b, np.float64)])
     return stacked[np.abs(stacked).max(axis=1, initial=0.0) > 0.0]
+
+
+@dataclass(frozen=True)
+class NonNegativeImpulse:
+    """Non-negative impulses whose Jᵀp is nearest to a generalized impulse."""
+
+    impulse: Floats  #: (c,) p >= 0 [N s]
+    residual: float  #: |L⁻¹(Jᵀp − given)| / |L⁻¹ given| in the kinetic metric
+
+    @property
+    def exists(self) -> bool:
+        """Whether the residual is zero up to rounding, so that p gives the same motion without pulling."""
+        return self.residual <= EXPLAINED
+
+
+def nonnegative_impulse(contact_jacobian: ArrayLike, generalized_impulse: ArrayLike,
+                        mass_matrix: ArrayLike) -> NonNegativeImpulse:  # fmt: skip
+    """Return p >= 0 with Jᵀp nearest to `generalized_impulse` (d,), for J (c, d) and M (d, d).
+
+    Source: Lawson and Hanson, Solving Least Squares Problems (1974), by `scipy.optimize.nnls`.
+
+    Raises
+    ------
+    SolverError
+        The least-squares iteration does not converge.
+    """
+    from scipy.optimize import nnls
+
+    rows, given = np.asarray(contact_jacobian, np.float64), np.asarray(generalized_impulse, np.float64)
+    if rows.ndim != 2 or rows.shape[1:] != given.shape:
+        raise ArgumentError("contact_jacobian", rows.shape, f"{len(given)} columns, as generalized_impulse")
+    cholesky = np.linalg.cholesky(np.asarray(mass_matrix, np.float64))
+    columns, goal = np.linalg.solve(cholesky, rows.T), np.linalg.solve(cholesky, given)
+    size, length = float(np.linalg.norm(goal)), np.linalg.norm(columns, axis=0)
+    if size == 0.0 or len(rows) == 0:
+        return NonNegativeImpulse(np.zeros(len(rows)), 0.0 if size == 0.0 else 1.0)
+    unit = np.where(length > 0.0, length, 1.0)
+    try:
+        scaled, residual = nnls(columns / unit, goal / size)
+    except RuntimeError as error:
+        raise SolverError(f"non-negative least squares: {error}") from error
+    return NonNegativeImpulse(scaled * size / unit, float(residual))
+
+
+def adhesion(contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: ArrayLike) -> str:
+    """Return NONE, ARTEFACT or ADHESIVE for impulses (c,) of any law."""
+    p = np.asarray(impulses, np.float64)
+    if p.min(initial=0.0) >= -ROUNDING * np.abs(p).max(initial=0.0):
+        return NONE
+    given = np.asarray(contact_jacobian, np.float64).T @ p
+    return ARTEFACT if nonnegative_impulse(contact_jacobian, given, mass_matrix).exists else ADHESIVE
 
 
 def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:

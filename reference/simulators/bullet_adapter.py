@@ -37,13 +37,11 @@ class Bullet:
         """
         stacked = scene.rests and len(scene.bodies) > 1
         push_out = DEFAULT_ERP if scene.rests and not stacked else 0.0
-        options: dict[str, str | float] = {
+        return Settings(step or DEFAULT_STEP, {
             "contactProcessingThreshold": 0.0, "restitutionVelocityThreshold": 0.0, "linearDamping": 0.0,
             "angularDamping": 0.0, "restitution of each body": sqrt(scene.restitution),
             "numSolverIterations": ITERATIONS_OF_A_STACK if stacked else ITERATIONS, "solverResidualThreshold": 0.0,
-            "erp": push_out, "contactERP": push_out,
-        }  # fmt: skip
-        return Settings(step or DEFAULT_STEP, options)
+            "erp": push_out, "contactERP": push_out})  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `stepSimulation`."""
@@ -83,11 +81,10 @@ def _add(bullet: Any, body: RigidBody | Obstacle, given: Any) -> int:
     if isinstance(body.shapes[0], Sphere):
         shape = bullet.createCollisionShape(bullet.module.GEOM_SPHERE, radius=body.shapes[0].radius)
     else:
-        boxes = [box for box in body.shapes if isinstance(box, Cuboid)]
-        halves, kind = [[0.5 * length for length in box.size] for box in boxes], bullet.module.GEOM_BOX
-        shape = (bullet.createCollisionShape(kind, halfExtents=halves[0]) if len(boxes) == 1 else
-                 bullet.createCollisionShapeArray([kind] * len(boxes), halfExtents=halves,
-                                                  collisionFramePositions=[box.center for box in boxes]))  # fmt: skip
+        boxes, kind = [box for box in body.shapes if isinstance(box, Cuboid)], bullet.module.GEOM_BOX
+        halves, centers = [[0.5 * length for length in box.size] for box in boxes], [box.center for box in boxes]
+        shape = bullet.createCollisionShape(kind, halfExtents=halves[0]) if len(boxes) == 1 else (
+            bullet.createCollisionShapeArray([kind] * len(boxes), halfExtents=halves, collisionFramePositions=centers))
     made: int = bullet.createMultiBody(body.mass, shape, -1, body.position, body.orientation)
     bullet.changeDynamics(made, -1, restitution=given["restitution of each body"], lateralFriction=0.0,
                           rollingFriction=0.0, spinningFriction=0.0, **{name: given[name] for name in _BODY},

@@ -40,17 +40,18 @@ class Drake:
         Without a given step, impacts are integrated with error control and with damping for e < 1; with a given step,
         by the discrete solver without damping.
         """
-        stacked = scene.rests and len(scene.bodies) > 1
-        corners: dict[str, str | float] = {"corner radius": LOADED_CORNER if stacked else CORNER}
+        corner = LOADED_CORNER if scene.rests and len(scene.bodies) > 1 else CORNER
         if scene.rests:
-            return Settings(step or STEP, {"mode": DISCRETE, "material": "default", **corners})
+            return Settings(step or STEP, {"mode": DISCRETE, "material": "default", "corner radius": corner})
         if step is None:
             lossy = viscous_dissipation_for(scene.restitution, scene.fastest)
-            return Settings(STEP, {"mode": CONTINUOUS, "accuracy": 1e-8, "point_contact_stiffness": OWN_STIFFNESS,
-                                   "hunt_crossley_dissipation": lossy, **corners}, NO_RESTITUTION)  # fmt: skip
+            given: dict[str, str | float] = {
+                "mode": CONTINUOUS, "accuracy": 1e-8, "point_contact_stiffness": OWN_STIFFNESS,
+                "hunt_crossley_dissipation": lossy, "corner radius": corner}  # fmt: skip
+            return Settings(STEP, given, NO_RESTITUTION)
         stiffness = GIVEN_STIFFNESS if scene.restitution == 1.0 else GIVEN_LOSSY_STIFFNESS
         return Settings(step, {"mode": DISCRETE, "point_contact_stiffness": stiffness, "relaxation_time": 0.0,
-                               "sap_near_rigid_threshold": 0.0, **corners}, DISSIPATES)  # fmt: skip
+                               "sap_near_rigid_threshold": 0.0, "corner radius": corner}, DISSIPATES)  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `Simulator.AdvanceTo`."""

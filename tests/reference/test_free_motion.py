@@ -1,4 +1,4 @@
-"""Free motion of the reference against closed forms: tops, spins, throws, rolling; in steps and in the truth of events.
+"""The reference's mechanics: free motion against closed forms and beside the engine's, by Pinocchio.
 
 The truth of events has no friction, so only the world "ideal-friction" is asked to roll.
 """
@@ -11,21 +11,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
-from iapb.errors import SolverError
+from iapb import resolve_impact
+from iapb.errors import ArgumentError, SolverError
+from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_names
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
+from reference import rigid_body
 from reference.free_motion import free_motion
-from reference.random_mechanisms import random_mechanism
+from reference.random_mechanisms import random_mechanism, random_state
 from reference.rigid_body import PinocchioMechanism, model_of
 from reference.scene_events import scene_truth
 from reference.time_stepping import RigidConstraints
+from verification.mechanics.engine_differences import compare
 
 Floats = NDArray[np.float64]
 Moved = Callable[[Scene, float], tuple[Floats, Floats, Floats]]
@@ -228,3 +234,56 @@ def test_rates_are_those_of_the_exponential_map(kind: str) -> None:
     near, far = ((mechanics.integrate(q, v, s * h) - mechanics.integrate(q, v, -s * h)) / (2.0 * s * h)
                  for s in (1.0, 2.0))  # fmt: skip
     assert (4.0 * near - far) / 3.0 == pytest.approx(mechanics.rate(q, 1000.0 * v) / 1000.0, abs=1e-8)
+
+
+AGREEMENT = 1e-11  # relative to the largest entry; two algorithms of 30 links, each exact to some 1e-14
+MOVING = tuple(kind for kind in KINDS if kind != "fixed")
+seeds = st.integers(0, 2**32 - 1)
+
+
+@settings(max_examples=60)
+@given(seeds, st.integers(1, 30), st.integers(1, 3))
+def test_random_trees_agree(seed: int, joints: int, trees: int) -> None:
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, joints, trees=trees)
+    if mechanism.nv:
+        differences = compare(mechanism, rigid_body.model_of(mechanism), *random_state(rng, mechanism))
+        assert max(differences.values()) <= AGREEMENT, differences
+
+
+@settings(max_examples=40)
+@given(seeds, st.floats(1e-3, 3.0))
+def test_motion_on_the_manifold_agrees(seed: int, size: float) -> None:
+    rng = np.random.default_rng(seed)
+    mechanism = random_mechanism(rng, 6, MOVING)
+    model, (q, v) = rigid_body.model_of(mechanism), random_state(rng, mechanism)
+    v *= size / np.abs(v).max()
+    theirs = model.integrate(q, v, 1.0)
+    assert np.abs(mechanism.difference(mechanism.integrate(q, v, 1.0), theirs)).max() <= 1e-7
+
+
+def test_a_model_in_another_order_and_an_unknown_body_are_refused() -> None:
+    root, left, right, hand = (Body(name, parent, Joint("revolute"), mass=1.0, inertia=np.eye(3)) for name, parent in
+                               (("root", None), ("left", "root"), ("right", "root"), ("hand", "left")))  # fmt: skip
+    model = rigid_body.model_of(Mechanism([root, left, hand, right]))
+    with pytest.raises(ArgumentError, match="depth-first"):
+        rigid_body.model_of(Mechanism([root, left, right, hand]))
+    with pytest.raises(ArgumentError, match="name of a body"):
+        model.placement(np.zeros(4), "foot")
+
+
+@settings(max_examples=100)
+@given(seeds, st.integers(1, 12), st.floats(-1.0, 1.0), st.floats(0.0, 4.0))
+def test_impulse_dynamics_agrees_on_independent_rows(seed: int, d: int, restitution: float, decades: float) -> None:
+    rng = np.random.default_rng(seed)
+    rows = int(rng.integers(1, d + 1))
+    # A = J L^-T with singular values over the given decades: J = A L^T
+    lower = np.tril(rng.normal(size=(d, d)), -1) * 0.3 + np.diag(rng.uniform(0.5, 2.0, d))
+    left, right = (np.linalg.qr(rng.normal(size=(n, n)))[0] for n in (rows, d))
+    a = left @ np.diag(np.logspace(0.0, -decades, rows)) @ right[:rows]
+    mass, jacobian, v = lower @ lower.T, a @ lower.T, rng.normal(size=d)
+    theirs = rigid_body.impulse_dynamics(mass, jacobian, v, restitution)
+    ours = resolve_impact(mass, jacobian, v, restitution).velocity
+    kappa = np.linalg.cond(np.linalg.solve(lower, jacobian.T))
+    bound = 1e-12 if kappa <= 10.0 else 100.0 * np.finfo(float).eps * kappa**2
+    assert np.abs(ours - theirs).max() <= bound * np.abs(v).max()

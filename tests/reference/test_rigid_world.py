@@ -1,28 +1,234 @@
-"""The rigid world on scenes: every scheme runs, friction stops the box where the textbook says."""
+"""Rigid steps by hand and by their conditions, contacts and rows; rigid worlds; the paper's worlds by name."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from threadpoolctl import threadpool_info
 
-from iapb.errors import ArgumentError, SolverError
+from iapb.contact.geometry import BOX, Shape, candidate_pairs, make_shapes
+from iapb.contact.laws import ImpulseAugmented
+from iapb.errors import ArgumentError, IapbError, SolverError
+from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_from_text
-from iapb.simulation import simulate
+from iapb.simulation import INTERRUPTED, simulate
 from iapb.system import System
-from reference import rigid_step, time_stepping
-from reference.contact_rows import find_rows, mechanics_of
-from reference.rigid_step import friction_step
+from reference import contact_finding, time_stepping
+from reference import rigid_step as stepping
+from reference.contact_finding import Contacts, find_contacts
+from reference.contact_rows import contact_jacobian, find_rows, mechanics_of
+from reference.one_thread import one_thread
+from reference.rigid_body import model_of
+from reference.rigid_step import NEWTON, POISSON, friction_step, rigid_step, velocity_bounds
 from reference.time_stepping import RigidConstraints, cost_of
-from reference.worlds import run_world
+from reference.worlds import WORLDS, find_world, require_complete, run_world
 
-SCENES = (
-    "peg_corner", "peg_hole", "newton_cradle", "box_stack", "three_link_arm_elastic", "arm_obstacles", "peg_hole_space",
-    "tumbling_body",
-)  # fmt: skip
-FLOOR = """
+DT = 1.0 / 512
+BAR, ENDS = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, -0.5]])
+
+
+def step(mass, v, f, rows, gap, e, **options):  # type: ignore[no-untyped-def]
+    rows, v = np.atleast_2d(np.asarray(rows, float)), np.asarray(v, float)
+    return rigid_step(np.asarray(mass, float), v, np.asarray(f, float), DT, rows, np.asarray(gap, float), rows @ v, e,
+                      **options)  # fmt: skip
+
+
+def energy(v, mass=BAR):  # type: ignore[no-untyped-def]
+    return 0.5 * float(v @ mass @ v)
+
+
+# one mass of 2 kg at −1 m/s: gap, restitution, options, v⁺
+HAND = [
+    (1e-4, 0.0, {}, -1e-4 / DT),  # an open plastic contact closes exactly and does not pass
+    (1e-4, 0.0, {"scheme": "moreau"}, -1.0), (1e-9, 0.5, {}, -1.0),  # an open elastic contact is left alone
+    (0.0, 0.0, {}, 0.0), (0.0, 0.3, {}, 0.3), (0.0, 1.0, {}, 1.0),  # a closed contact obeys Newton
+    (0.0, 0.5, {"scheme": "stewart-trinkle"}, 0.5),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("gap", "e", "options", "expected"), HAND)
+def test_one_mass_by_hand(gap: float, e: float, options: Any, expected: float) -> None:
+    result = step([[2.0]], [-1.0], [0.0], [[1.0]], [gap], e, **options)
+    assert result.velocity[0] == pytest.approx(expected, abs=1e-15)
+    assert result.impulse[0] == pytest.approx(2.0 * (1.0 + result.velocity[0]), abs=1e-14)
+
+
+def test_resting_contact_carries_the_load() -> None:
+    """A box on two equal corners under its weight: it stays, and the impulses sum to the weight times dt."""
+    result = step(np.diag([2.0, 0.005]), [0.0, 0.0], [-20.0, 0.0], [[1.0, 0.01], [1.0, -0.01]], [0.0, 0.0], 0.0)
+    assert np.abs(result.velocity).max() <= 1e-16 and result.impulse.min() > 0.0
+    assert result.impulse.sum() == pytest.approx(20.0 * DT, rel=1e-13)
+
+
+@given(st.integers(0, 10_000))
+def test_every_step_satisfies_its_conditions(seed: int) -> None:
+    """Feasible, non-adhesive, complementary, dynamics kept; a plastic closed step without load never gains energy."""
+    rng = np.random.default_rng(seed)
+    d, c = int(rng.integers(1, 7)), int(rng.integers(1, 9))
+    root = rng.normal(size=(d, d))
+    mass, v = root @ root.T + 0.1 * np.eye(d), rng.normal(size=d)
+    rows = rng.normal(size=(c, d)) @ np.diag(rng.integers(0, 2, size=d))
+    gap = rng.choice([-1e-3, 0.0, 1e-4], size=c)
+    result = step(mass, v, np.zeros(d), rows, gap, 0.0)
+    bound = velocity_bounds(gap, rows @ v, 0.0, DT)
+    scale = np.abs(rows).max() * max(np.abs(v).max(), np.abs(result.velocity).max()) + 1.0
+    assert (rows @ result.velocity - bound).min() >= -1e-9 * scale and result.impulse.min() >= 0.0
+    left = mass @ (result.velocity - v) - rows.T @ result.impulse
+    assert np.abs(left).max() <= 1e-9 * scale * np.abs(mass).max() and result.residual <= stepping.STEP_TOLERANCE
+    if gap.max() <= 0.0:
+        assert result.velocity @ mass @ result.velocity <= (1.0 + 1e-12) * (v @ mass @ v)
+
+
+def test_facing_contacts_with_restitution_step_by_poisson_and_say_so() -> None:
+    """A mass between two closed walls: no velocity obeys Newton at both; Poisson's step stops it."""
+    result = step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 0.0], 0.5)
+    assert result.restitution_law == POISSON and result.impulse == pytest.approx([1.5, 0.5])
+    assert result.velocity[0] == pytest.approx(0.0, abs=1e-15)
+    assert step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 1.0], 0.5).restitution_law == NEWTON
+    early = step(np.eye(1), [-1.0], [0.0], [[1.0]], [1e-4], 0.5, scheme="stewart-trinkle")
+    assert early.restitution_law == POISSON and 1e-4 + DT * early.velocity[0] >= 0.0  # before it passes
+
+
+def test_an_open_contact_may_not_pass_where_its_own_restitution_is_zero() -> None:
+    gap, v = np.array([1e-4, 1e-4]), np.array([-1.0, -1.0])
+    found = rigid_step(np.eye(2), v, np.zeros(2), DT, np.eye(2), gap, v, np.array([0.0, 0.5]))
+    assert gap[0] + DT * found.velocity[0] == pytest.approx(0.0, abs=1e-18) and found.velocity[1] == -1.0
+
+
+def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("daqp", "quadprog", "gauss_seidel"):
+        assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # by those left
+        monkeypatch.setitem(stepping.STEP_SOLVERS, name, lambda rows, offset: np.full(len(offset), 0.123))
+    with pytest.raises(SolverError, match="residual"):
+        step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0)
+
+
+def test_velocities_that_cancel_are_judged_by_their_rounding() -> None:
+    """A gram under a tonne, at rest: 5e3 m/s from above and from below leave 1e-12 m/s, not a wrong active set."""
+    mass, load = np.diag([1e-3, 1e3]), np.array([-9.81e-3, -9.81e3])
+    result = step(mass, [0.0, 0.0], load, [[1.0, 0.0], [-1.0, 1.0]], [0.0, 0.0], 0.0)
+    assert np.abs(result.velocity).max() <= 1e-11
+    assert result.impulse == pytest.approx([9.81e3 * DT, 9.81e3 * DT], rel=1e-5)
+
+
+def test_stabilization_removes_its_share_of_the_overlap() -> None:
+    overlap = np.array([-1e-3])
+    bound = velocity_bounds(overlap, np.array([0.0]), 0.0, DT, stabilization=0.25)
+    assert overlap[0] + DT * bound[0] == pytest.approx(0.75 * overlap[0])
+
+
+@pytest.mark.parametrize(("given_", "says"), [
+    ({"restitution": np.array([0.5])}, "restitution"), ({"restitution": np.array([0.5, 1.5])}, "restitution"),
+    ({"restitution": -0.1}, "restitution"), ({"restitution": 0.0, "stabilization": 2.0}, "stabilization"),
+    ({"restitution": 0.0, "scheme": "euler"}, "scheme"),
+])  # fmt: skip
+def test_bounds_out_of_range_are_refused(given_: dict[str, Any], says: str) -> None:
+    with pytest.raises(ArgumentError, match=says):
+        velocity_bounds(np.zeros(2), np.zeros(2), dt=DT, **given_)
+
+
+# --- restitution: one e for all contacts, or one for each -----------------------------------------------------------
+@pytest.mark.parametrize("e", [(1.0, 0.0), (0.3, 0.8), (0.5, 0.5)])
+def test_each_contact_returns_its_own_share(e: tuple[float, float]) -> None:
+    """A bar falls flat on its two ends: J v⁺ = −E J v⁻ at both, by Newton's law; equal e is the scalar's step."""
+    found = step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], np.array(e))
+    assert found.restitution_law == NEWTON
+    assert ENDS @ found.velocity == pytest.approx(e, abs=1e-14)
+    if e[0] == e[1]:
+        assert np.array_equal(found.velocity, step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], e[0]).velocity)
+
+
+@pytest.mark.parametrize("e", [np.array([1.0, 0.0]), 0.97, 1.0])
+def test_a_bar_that_turns_does_not_gain(e: Any) -> None:
+    """One end falls at 1 m/s, the other rises at 0.1 m/s: Newton's step would make 0.015 J of nothing with e = 1."""
+    v = np.linalg.solve(ENDS, [-1.0, 0.1])
+    newton = stepping.nearest_velocity(BAR, v, ENDS, velocity_bounds(np.zeros(2), ENDS @ v, e, DT))
+    found = step(BAR, v, [0.0, 0.0], ENDS, [0.0, 0.0], e)
+    if np.ndim(e) == 0 and e == 1.0:
+        assert newton.impulse == pytest.approx([0.65, 0.3])
+        assert energy(newton.velocity) - energy(v) == pytest.approx(0.015)
+    assert energy(newton.velocity) > energy(v) * (1.0 + 1e-6)  # what is avoided
+    assert energy(found.velocity) <= energy(v) * (1.0 + 1e-14)
+    assert found.restitution_law == POISSON and (ENDS @ found.velocity).min() >= -1e-14
+
+
+def test_a_load_at_rest_is_not_thrown_by_rounding() -> None:
+    """Speeds of 1e-17 m/s of both signs on the feet of a loaded box: it is carried, e = 1 or not."""
+    v = np.linalg.solve(ENDS, [-1e-17, 1e-17])
+    found = step(BAR, v, [-9.81, 0.0], ENDS, [0.0, 0.0], 1.0)
+    assert found.restitution_law == NEWTON and np.abs(found.velocity).max() <= 1e-15
+
+
+@pytest.mark.parametrize("equal", [0.3, 0.7, 1.0, None])
+@given(seed=st.integers(0, 10_000))
+def test_steps_never_gain(equal: float | None, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    d, c = int(rng.integers(1, 7)), int(rng.integers(2, 7))
+    root, rows, v = rng.normal(size=(d, d)), rng.normal(size=(c, d)), rng.normal(size=d)
+    mass, e = root @ root.T + 0.1 * np.eye(d), rng.choice([0.0, 0.3, 1.0], size=c)
+    found = step(mass, v, np.zeros(d), rows, np.zeros(c), e if equal is None else equal)
+    assert energy(found.velocity, mass) <= (1.0 + 1e-9) * energy(v, mass)
+    assert (rows @ found.velocity).min() >= -1e-8 * np.abs(rows).max() * np.abs(v).max() * d
+
+
+def test_boxes_in_space_overlap_as_coal_says() -> None:
+    """Normal and depth of two boxes at random, where a face decides and where edges do."""
+    coal, rng, compared = pytest.importorskip("coal"), np.random.default_rng(0), 0
+    for _ in range(200):
+        sizes = rng.uniform(0.5, 1.5, size=(2, 3))
+        axes = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)] + [np.eye(3)])
+        axes[:2] *= np.sign(np.linalg.det(axes[:2]))[:, None, None]
+        origins = np.array([np.zeros(3), rng.normal(scale=0.6, size=3), np.zeros(3)])
+        shapes = make_shapes([Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True)
+        found = find_contacts(shapes, candidate_pairs(shapes), axes, origins, 0.0)
+        (one, other), result = (coal.Box(*size) for size in sizes), coal.CollisionResult()
+        poses = [coal.Transform3s(axes[k], origins[k]) for k in range(2)]
+        if not coal.collide(one, poses[0], other, poses[1], coal.CollisionRequest(), result):
+            assert not len(found.gap) or found.gap.min() > -1e-6
+            continue
+        depth, compared = result.getContact(0).penetration_depth, compared + 1
+        assert found.gap.min() == pytest.approx(depth, abs=1e-6 + contact_finding.EDGE_SHARE * abs(depth))
+    assert compared > 50
+
+
+def linkage() -> Mechanism:
+    """Two links in a chain and a free peg."""
+    inertia, elbow = np.diag([0.1, 0.1, 0.1]), (np.eye(3), np.array([1.0, 0.0, 0.0]))
+    return Mechanism([Body("upper", None, Joint("revolute"), mass=1.0, inertia=inertia),
+                      Body("lower", "upper", Joint("revolute"), elbow, mass=1.0, inertia=inertia),
+                      Body("peg", None, Joint("planar"), mass=2.0, inertia=inertia)])  # fmt: skip
+
+
+def rows_of(q: np.ndarray, bodies: list[tuple[int, int]], points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    a, b = np.array(bodies, np.int32).T
+    nothing = np.zeros(len(a), np.int32)
+    found = Contacts(nothing, nothing, a, b, nothing.astype(np.int64), points, normals, np.zeros(len(a)))
+    return contact_jacobian(normals, found, *model_of(linkage()).bodies(q)[1:])
+
+
+def test_rows_are_those_of_the_engines_point_jacobians() -> None:
+    rng, mechanism, bodies = np.random.default_rng(0), linkage(), [(0, -1), (1, -1), (2, 1), (1, 2)]
+    q, angles, points = rng.normal(size=mechanism.nq), rng.uniform(0.0, 6.0, size=4), rng.normal(size=(4, 3))
+    normals = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(4)])
+    for row, n, x, (a, b) in zip(rows_of(q, bodies, points, normals), normals, points, bodies, strict=True):
+        other = mechanism.point_jacobian(q, b, x) if b >= 0 else 0.0
+        assert row == pytest.approx(n @ (mechanism.point_jacobian(q, a, x) - other), abs=1e-14)
+
+
+def test_a_straight_arm_struck_along_itself_has_no_row() -> None:
+    """Rounding leaves 1e-16 of a lever arm; as a row of its own it would take half the energy."""
+    q, axis = np.array([0.7, 0.0, 0.0, 0.0, 0.0]), np.array([[np.cos(0.7), np.sin(0.7), 0.0]])
+    assert not rows_of(q, [(1, -1)], 1.7 * axis, -axis).any()
+
+
+BOX_SCENE = """
 name: on_the_floor
 dimensions: 3
 rate: 1000
@@ -33,22 +239,12 @@ bodies:
     joint: free_flyer
     mass: 1
     inertia: [4e-4, 4e-4, 4e-4]
-    shapes: [%s]
-    position: [0, 0, %s, 0, 0, 0, 1]
+    shapes: [{kind: box, size: [0.2, 0.2, 0.02]}]
+    position: [0, 0, 0.01, 0, 0, 0, 1]
     velocity: [0.3, 0.4, 0, 0, 0, 0]
 walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}]
 contact: {restitution: 0, friction: 0.6, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
 """
-BOX = FLOOR % ("{kind: box, size: [0.2, 0.2, 0.02]}", 0.01)
-BALL = FLOOR % ("{kind: sphere, radius: 0.0316227766}", 0.0316227766)  # 2/5 m r² = 4e-4 kg m²
-
-
-@pytest.mark.parametrize("scheme", ["moreau", "stewart-trinkle"])
-@pytest.mark.parametrize("name", SCENES)
-def test_every_scheme_runs_and_says_what_it_is(name: str, scheme: str) -> None:
-    run = simulate(load_scene(find_scene(name)), RigidConstraints(scheme=scheme, stabilization=0.2), steps=120)
-    assert run.complete and np.isfinite(run.q).all()
-    assert run.law == "rigid constraints" and run.law_settings["scheme"] == scheme
 
 
 def test_a_tight_elastic_hole_does_not_end_the_run() -> None:
@@ -61,20 +257,11 @@ def test_a_tight_elastic_hole_does_not_end_the_run() -> None:
 @pytest.mark.parametrize("friction", ["coulomb", "relaxed"])
 def test_a_box_slides_straight_in_space_and_stops_where_the_textbook_says(friction: str) -> None:
     """v²/(2 μ g) = 21 mm along (0.6, 0.8); the relaxed law throws it up, at μ v at most."""
-    run = simulate(scene_from_text(BOX), RigidConstraints(friction=friction), steps=110)
+    run = simulate(scene_from_text(BOX_SCENE), RigidConstraints(friction=friction), steps=110)
     expected, near = 0.5**2 / (2.0 * 0.6 * 9.81), {"coulomb": 1e-3, "relaxed": 2e-3}[friction]
     assert run.complete and run.q[-1, :2] == pytest.approx(expected * np.array([0.6, 0.8]), abs=near)
     assert np.abs(run.v[-1]).max() < 2e-2
     assert run.q[:, 2].max() <= 0.01 + {"coulomb": 1e-9, "relaxed": (0.6 * 0.5) ** 2 / (2.0 * 9.81)}[friction]
-
-
-@pytest.mark.parametrize(("friction", "expected"), [("coulomb", 5.0 / 7.0), ("none", 1.0)])
-def test_a_ball_slides_until_it_rolls_at_five_sevenths_of_its_speed(friction: str, expected: float) -> None:
-    """After 2 v/(7 μ g) = 24 ms, to the 1 % that it turns in a step. Without friction it never rolls: the fault."""
-    run = simulate(scene_from_text(BALL), RigidConstraints(friction=friction), steps=40)
-    assert np.hypot(*np.diff(run.q[-2:, :2], axis=0)[0]) * 1000.0 == pytest.approx(0.5 * expected, rel=1e-2)
-    rolling = np.linalg.norm(run.v[-1, 3:]) * 0.0316227766
-    assert rolling == pytest.approx(0.5 * expected if friction != "none" else 0.0, rel=1e-2)
 
 
 @pytest.mark.parametrize("size", [2, 3])
@@ -100,13 +287,6 @@ def test_contacts_without_a_common_body_are_solved_apart() -> None:
         alone, _, _ = friction_step(np.eye(6), v_free[at], part[:, 0], part[:, 1:], np.zeros(3), 0.3)
         assert v[at] == pytest.approx(alone, abs=1e-9)
     assert (normal > 0.0).any()
-
-
-def test_a_step_without_solution_says_how_many_contacts_it_had(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rigid_step, "FRICTION_TOLERANCE", -1.0)
-    monkeypatch.setattr(rigid_step, "CONVERGED", -1.0)
-    with pytest.raises(SolverError, match="1 contacts.*nsgs.*cvxpy_socp"):
-        friction_step(np.eye(2), np.array([0.3, -1.0]), np.eye(2)[1:], np.eye(2)[None, :1], np.zeros(1), 0.5)
 
 
 @pytest.mark.parametrize("wrong", [{"scheme": "euler"}, {"friction": "viscous"}])
@@ -211,3 +391,84 @@ def test_too_many_are_refused_before_the_first_step(monkeypatch: pytest.MonkeyPa
     for world in ("ideal", "ideal-friction"):
         with pytest.raises(ArgumentError, match=r"at most 500 numbers .* 36 contacts of 24 coordinates have 864"):
             run_world(row(8, False, CIRCLE), world)
+
+
+PEG = load_scene(find_scene("peg_corner"))
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name: str) -> None:
+    world = find_world(name)
+    coupling = world.coupling_in(PEG)
+    assert coupling.name == ("unilateral" if name == "CBuc" else "four-channel")
+    gains = getattr(PEG.couplings, coupling.name.replace("-", "_"))
+    assert coupling.settings == {"stiffness": list(gains.stiffness), "damping": list(gains.damping)}
+    run, parts = run_world(PEG, name, steps=60), simulate(PEG, world.law, coupling, steps=60)
+    assert run.world == name and run.complete
+    assert np.array_equal(run.q, parts.q) and np.array_equal(run.device_q, parts.device_q)
+    assert world.coupling_in(load_scene(find_scene("two_discs"))).name == "none"
+    assert world.coupling_in(PEG.with_values({"couplings": {}})).name == "none"
+
+
+def test_a_box_on_a_slope_slides_in_the_world_without_friction_and_sticks_in_the_one_with_it() -> None:
+    sin, cos, box = np.sin(np.pi / 9.0), np.cos(np.pi / 9.0), {"kind": "box", "size": [0.1, 0.1]}
+    slope = Scene.model_validate({
+        "name": "slope", "rate": 500.0, "duration": 0.2, "gravity": [0.0, -9.81], "contact": {"friction": 0.5},
+        "bodies": [{"name": "box", "joint": "planar", "mass": 1.0, "inertia": 1.0 / 600.0, "shapes": [box],
+                    "position": [0.05 * sin, 0.05 * cos, -np.pi / 9.0]}],
+        "walls": [{"name": "slope", "kind": "half_plane", "point": [0.0, 0.0], "normal": [sin, cos]}],
+    })  # fmt: skip
+    ice = slope.with_values({"bodies.box.friction": 0.0})
+    assert run_world(ice, "ideal-friction").q[-1, :2] == pytest.approx(run_world(ice, "ideal").q[-1, :2], abs=1e-12)
+    slid = {name: float(np.diff(run_world(slope, name).q[[0, -1], :2], axis=0)[0] @ [cos, -sin])
+            for name in ("ideal", "ideal-friction")}  # fmt: skip
+    # The step is a hundredth of 0.2 s, and the law is of first order.
+    assert slid["ideal"] == pytest.approx(0.5 * 9.81 * sin * 0.2**2, rel=0.02)
+    assert abs(slid["ideal-friction"]) < 1e-9
+
+
+def test_a_scene_may_be_given_by_name_or_path_and_a_rendering_goes_into_the_label() -> None:
+    for scene in ("peg_corner", find_scene("peg_corner"), str(find_scene("peg_corner"))):
+        assert np.array_equal(run_world(scene, "PB", steps=3).q, run_world(PEG, "PB", steps=3).q)
+    assert find_world("IAPB", "spread").law == ImpulseAugmented(rendering="spread")
+    assert run_world(PEG, "IAPB", "scale", steps=3).world == "IAPB scale"
+
+
+@pytest.mark.parametrize(("call", "says"), [
+    (lambda: run_world("peg_cornre", "PB"), "peg_corner"),
+    (lambda: find_world("CBuc").coupling_in(PEG.with_values({"couplings.unilateral": None})), "gives no gains"),
+    (lambda: find_world("ideal", "spread"), "rendering = 'spread': expected full.*ideal"),
+    (lambda: find_world("PB", "spread"), "rendering = 'spread': expected full.*PB"),
+    (lambda: find_world("IAPB", "clip"), "rendering = 'clip'"),
+    (lambda: find_world("best"), "world = 'best': expected one of IAPB, PB, "),
+])  # fmt: skip
+def test_worlds_that_cannot_be_are_refused(call: Callable[[], Any], says: str) -> None:
+    with pytest.raises(ArgumentError, match=says):
+        call()
+
+
+def interrupt(done: int, total: int) -> None:
+    raise KeyboardInterrupt
+
+
+def test_an_incomplete_run_is_handed_on_only_to_who_asks_for_it() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        run_world(PEG, "PB", progress=interrupt)
+    run = run_world(PEG, "PB", progress=interrupt, partial=True)
+    assert not run.complete and run.stopped == INTERRUPTED and 0 < run.steps < PEG.steps
+    with pytest.raises(IapbError, match="peg_corner in the world PB stopped after .* s: too fast"):
+        require_complete(replace(run, stopped="too fast"))
+    whole = replace(run, complete=True, stopped="")
+    assert require_complete(whole) is whole
+
+
+def test_every_blas_has_one_thread_inside_and_its_own_number_outside() -> None:
+    def threads() -> list[int]:
+        return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+    with one_thread():
+        pass  # now numpy's and scipy's are loaded
+    before = threads()
+    with one_thread():
+        assert len(before) >= 2 and threads() == [1] * len(before)
+    assert threads() == before

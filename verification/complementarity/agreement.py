@@ -26,9 +26,8 @@ from functools import partial
 import numpy as np
 
 from iapb import resolve_impact
-from reference.complementarity.adhesion import adhesion
 from reference.complementarity.laws import LAWS as laws
-from reference.complementarity.laws import Outcome
+from reference.complementarity.laws import Outcome, adhesion
 from reference.complementarity.problem import ImpactProblem
 from verification.complementarity.cases import two_contacts
 from verification.finding import Failure, attempt

@@ -19,8 +19,7 @@ import numpy as np
 
 from iapb import resolve_impact
 from iapb.errors import SolverError
-from reference.complementarity.adhesion import nonnegative_impulse
-from reference.complementarity.laws import newton_lcp
+from reference.complementarity.laws import newton_lcp, nonnegative_impulse
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import DatasetError, problem_files, read_problem
 from verification.clock import timed

@@ -6,7 +6,7 @@ steps solve the natural map F(p) = p − proj_K(p − w) = 0, with F = w for joi
 because W is singular for redundant contacts. The Newton result with the smallest F is returned.
 Source: Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991); Carpentier, Montaut, Le Lidec, RSS (2024).
 
-The cone program (cvxpy with Clarabel) is the relaxed law,  min ½|Aᵀp|² + bᵀp  over the cones. Coulomb's law is that
+The cone program (by cvxpy) is the relaxed law,  min ½|Aᵀp|² + bᵀp  over the cones, or p >= 0. Coulomb's law is that
 program with the shift added to the normal part of b. The shift depends on the solution, so the program is solved
 repeatedly until the shift is constant (convergence is not guaranteed).
 Source: Anitescu and Tasora, Comput. Optim. Appl. 47 (2010); Acary, Cadoux, Lemaréchal, Malick, ZAMM 91 (2011).
@@ -33,17 +33,22 @@ _BALANCED_EVERY = 20
 _SOLVED = 1e-12  # largest |F| at unit W and b; Newton's last step leaves some hundred roundings
 _SHORTEST = 2.0**-12  # of Newton's step in the line search
 _DEPENDENT = 1e-11  # share of the largest singular value of F' below which a direction counts as none
-# Of the cone program: accuracy requested at unit W and b (near the apex the natural map reaches its square root), most
-# fixed-point iterations, and the change of the shift, relative to the velocity scale, at which the iteration stops.
-_ACCURACY, _ROUNDS, _STILL = 1e-12, 50, 1e-9
+_ROUNDS, _STILL = 50, 1e-9  # of cone programs; change of the shift, share of the velocity scale, at which they stop
+# Backends and accuracy requested at unit W and b; the defaults are 1e-4 to 1e-6. Near the apex of cones, the natural
+# map reaches its square root. Without friction, below 1e-11, Clarabel drifts along the unbounded set of impulses of
+# opposed contacts (p to 6e9, residual up to 4e-6).
+_CVXPY: dict[str, tuple[str, dict[str, Any]]] = {
+    "socp": ("CLARABEL", {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}),
+    "CLARABEL": ("CLARABEL", {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}),
+    "OSQP": ("OSQP", {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20_000, "polishing": True, "time_limit": 10.0}),
+    "SCS": ("SCS", {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iters": 20_000}),
+}
 
 
 def solve(problem: ImpactProblem, method: str) -> Answer:
-    """Return the impulse by "newton" or "socp"; its residuals show whether it converged."""
-    return _by_cone_programs(problem) if method == "socp" else _by_newton(problem)
-
-
-def _by_newton(problem: ImpactProblem) -> Answer:
+    """Return the impulse by "newton" or by programs of _CVXPY; its residuals show whether it converged."""
+    if method in _CVXPY:
+        return _by_programs(problem, *_CVXPY[method])
     if problem.asymmetry > SYMMETRY_TOLERANCE:
         raise SolverError(f"refused: W is asymmetric (relative {problem.asymmetry:.1e})")
     k, m = problem.contacts, problem.contact_size
@@ -158,7 +163,8 @@ def _projection_derivative(x: Floats, mu: Floats) -> Floats:
     return D
 
 
-def _by_cone_programs(problem: ImpactProblem) -> Answer:
+def _by_programs(problem: ImpactProblem, backend: str, settings: dict[str, Any]) -> Answer:
+    """Use the factor A, not a quadratic form of W, because redundant contacts make W rank deficient."""
     import cvxpy as cp
 
     rows, speed, mu = problem.factor, velocity_scale(problem), problem.friction_or_zero
@@ -170,21 +176,23 @@ def _by_cone_programs(problem: ImpactProblem) -> Answer:
     if len(rough):
         cones.append(cp.SOC(cp.multiply(mu[rough], blocks[0, rough]), blocks[1:, rough]))
     if len(smooth):
-        cones += [blocks[0, smooth] >= 0.0, blocks[1:, smooth] == 0.0]
+        cones.append(blocks[0, smooth] >= 0.0)
+        cones += [blocks[1:, smooth] == 0.0] if problem.contact_size > 1 else []
     program = cp.Problem(cp.Minimize(0.5 * cp.sum_squares((rows.T / root) @ p) + offset @ p), cones)
     shift = np.zeros(problem.contacts)
     for done in range(1, _ROUNDS + 1):
         scaled = problem.offset / speed
         scaled[:: problem.contact_size] += shift
         offset.value = scaled
-        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
-            warnings.simplefilter("ignore", UserWarning)
-            program.solve(solver="CLARABEL", tol_gap_abs=_ACCURACY, tol_gap_rel=_ACCURACY, tol_feas=_ACCURACY)
-        if p.value is None:
-            return Answer(None, f"CLARABEL: {program.status} in round {done}")
-        impulse = np.asarray(p.value) * speed / root**2
-        if problem.relaxed:
-            return Answer(impulse, f"CLARABEL: {program.status}")
+        try:
+            with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
+                warnings.simplefilter("ignore", UserWarning)
+                program.solve(solver=backend, **settings)
+        except cp.error.SolverError as error:
+            return Answer(None, f"{backend}: {error}")
+        impulse = None if p.value is None else np.asarray(p.value) * speed / root**2
+        if problem.friction is None or problem.relaxed or impulse is None:
+            return Answer(impulse, f"{backend}: {program.status}")
         u = problem.contact_velocity(impulse).reshape(-1, problem.contact_size)
         slipping = np.where(problem.two_sided, 0.0, mu * np.linalg.norm(u[:, 1:], axis=1))
         before, shift = shift, slipping / speed

@@ -2,16 +2,14 @@
 
 Velocity form: min ½|x|² subject to A x + b >= 0. Here x = Aᵀp is the change of velocity in kinetic coordinates, and p
 are the multipliers. The Hessian is the identity for any rank of W, so redundant contacts are no problem.
-Impulse form: min ½|Aᵀp|² + bᵀp subject to p >= 0. If all contacts have the same e, then b = (1 + e) A u, and the
-objective is ½|Aᵀp + (1 + e) u|² up to a constant (Moreau; Anitescu and Potra, Nonlinear Dynamics 14, 1997).
+Impulse form: min ½|Aᵀp|² + bᵀp subject to p >= 0 (cvxpy's backends: `cones`). If all contacts have the same e, then
+b = (1 + e) A u, and the objective is ½|Aᵀp + (1 + e) u|² up to a constant (Moreau; Anitescu and Potra, Nonlinear
+Dynamics 14, 1997).
 Source: daqp, Arnström, Bemporad, Axehill, IEEE Transactions on Automatic Control 67 (2022); quadprog, Goldfarb, Idnani,
 Mathematical Programming 27 (1983); proxqp, Bambade and others, Robotics: Science and Systems (2022).
 """
 
 from __future__ import annotations
-
-import warnings
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,19 +23,10 @@ _INEQUALITY, _EQUALITY = 0, 5  # daqp's `sense` of a row
 _ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings
 _INFINITE = 1e30  # daqp's value for an absent bound
 _PROXQP = 1e-10  # accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
-# Requested accuracy for a problem scaled to unit W and b; the defaults are 1e-4 to 1e-6. Below 1e-11, Clarabel drifts
-# along the unbounded set of impulses of opposed contacts (p to 6e9, residual up to 4e-6).
-_CVXPY: dict[str, dict[str, Any]] = {
-    "CLARABEL": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
-    "OSQP": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20_000, "polishing": True, "time_limit": 10.0},
-    "SCS": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iters": 20_000},
-}
 
 
 def solve(problem: ImpactProblem, method: str) -> Answer:
-    """Return the impulse by "daqp" or "quadprog" (velocity form), "proxqp", or a backend of cvxpy (impulse form)."""
-    if method in _CVXPY:
-        return _by_cvxpy(problem, method)
+    """Return the impulse by "daqp" or "quadprog" (velocity form) or "proxqp" (impulse form)."""
     if method == "proxqp":
         return _by_proxqp(problem)
     if method == "daqp":
@@ -94,22 +83,3 @@ def _by_proxqp(problem: ImpactProblem) -> Answer:
     if answer.x is None:
         return Answer(None, "proxqp found no solution")
     return Answer(np.asarray(answer.x) * speed / inertia, f"proxqp found: {answer.found}")
-
-
-def _by_cvxpy(problem: ImpactProblem, backend: str) -> Answer:
-    """Use the factor A, not a quadratic form of W, because redundant contacts make W rank deficient."""
-    import cvxpy as cp
-
-    rows = problem.factor
-    root, speed = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0, velocity_scale(problem)
-    p, one_sided = cp.Variable(problem.size), np.flatnonzero(~problem.two_sided)
-    energy = 0.5 * cp.sum_squares((rows.T / root) @ p) + (problem.offset / speed) @ p
-    program = cp.Problem(cp.Minimize(energy), [p[one_sided] >= 0.0] if len(one_sided) else [])
-    try:
-        with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
-            warnings.simplefilter("ignore", UserWarning)
-            program.solve(solver=backend, **_CVXPY[backend])
-    except cp.error.SolverError as error:
-        return Answer(None, f"{backend}: {error}")
-    impulse = None if p.value is None else np.asarray(p.value) * speed / root**2
-    return Answer(impulse, f"{backend}: {program.status}")

@@ -1,0 +1,323 @@
+"""Event-driven truths by hand and by energy; time stepping, rigid worlds and the engine against them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iapb.advice.certificate import certify
+from iapb.errors import ArgumentError, SolverError
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.simulation import simulate
+from iapb.system import System
+from reference.complementarity import ImpactProblem
+from reference.complementarity.laws import Outcome, poisson
+from reference.event_driven import LinearSystem, event_driven
+from reference.rigid_body import model_of
+from reference.rigid_step import nearest_velocity, rigid_step
+from reference.scene_events import scene_truth
+from reference.worlds import run_world
+
+PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
+
+
+def ball(e: float, mass: float = 1.0) -> LinearSystem:
+    return LinearSystem([[mass]], [-9.81 * mass], [[1.0]], [0.0], e)
+
+
+def row_of_balls(masses: list[float], e: float) -> LinearSystem:
+    """Balls on a line, coordinates left to right, radius absorbed."""
+    n = len(masses)
+    return LinearSystem(np.diag(masses), np.zeros(n), np.diff(np.eye(n), axis=0), np.zeros(n - 1), e)
+
+
+def moreau_jean(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int) -> tuple[np.ndarray, ...]:
+    """Moreau-Jean's scheme with theta = 1/2 (Jean, Comput. Methods Appl. Mech. Eng. 177, 1999): t, q, v, impulses."""
+    states = [(0.0, np.array(q), np.array(v), np.zeros(len(system.start)))]
+    for k in range(steps):
+        _, at, moving, _ = states[-1]
+        gamma = system.rows @ moving
+        bound = np.where(system.gap(at) + 0.5 * dt * gamma <= 0.0, -system.restitution * gamma, -np.inf)
+        free = moving + dt * np.linalg.solve(system.mass_matrix, system.force)
+        found = nearest_velocity(system.mass_matrix, free, system.rows, bound)
+        states.append(((k + 1) * dt, at + 0.5 * dt * (found.velocity + moving), found.velocity, found.impulse))
+    return tuple(np.array(part) for part in zip(*states, strict=True))
+
+
+def test_ball_bounces_at_the_times_of_the_textbook() -> None:
+    e, height, g = 0.8, 1.0, 9.81
+    exact = event_driven(ball(e), [height], [0.0], 2.0)
+    fall = np.sqrt(2.0 * height / g)
+    expected = fall * np.array([0.0, 1.0, 1.0 + 2.0 * e, 1.0 + 2.0 * e + 2.0 * e**2])
+    assert exact.event_time[:4] == pytest.approx(expected, rel=1e-14)
+    assert exact.v[1, 0] == pytest.approx(e * g * fall, rel=1e-14)
+
+
+def test_accumulating_impacts_are_reported_not_crossed() -> None:
+    """Beyond fall (1 + e)/(1 − e) the ball rests; the trajectory ends before and says where."""
+    exact = event_driven(ball(0.5), [1.0], [0.0], 10.0, most_events=30)
+    limit = np.sqrt(2.0 / 9.81) * 1.5 / 0.5
+    assert exact.end <= limit and exact.end == pytest.approx(limit, rel=1e-6)
+    with pytest.raises(ArgumentError, match="times in"):
+        exact.state([5.0])
+
+
+def test_plastic_block_slides_into_the_corner_and_rests() -> None:
+    """A block pushed right and down: floor, then wall, then still; each wall's impulse is the lost momentum."""
+    rows, start = [[0.0, 1.0], [-1.0, 0.0]], [0.0, 1.0]
+    system = LinearSystem(2.0 * np.eye(2), [1.0, -4.0], rows, start, 0.0)
+    exact = event_driven(system, [0.0, 0.25], [0.0, 0.0], 5.0)
+    assert exact.event_time == pytest.approx([0.0, 0.5, 2.0], rel=1e-14)
+    assert exact.impulse[1] == pytest.approx([2.0, 0.0]) and exact.impulse[2] == pytest.approx([0.0, 2.0])
+    q, v = exact.state([5.0])
+    assert q[0] == pytest.approx([1.0, 0.0], abs=1e-14) and np.abs(v).max() <= 1e-14
+
+
+def test_a_resting_contact_opens_when_the_force_lifts_it_and_equal_elastic_balls_exchange_their_velocities() -> None:
+    lifted = LinearSystem([[1.0]], [1.0], [[1.0]], [0.0], 0.0)
+    assert event_driven(lifted, [0.0], [0.0], 2.0).state([2.0])[0][0, 0] == pytest.approx(2.0)
+    exact = event_driven(row_of_balls([1.0, 1.0, 1.0], 1.0), [0.0, 1.0, 2.5], [1.0, 0.0, 0.0], 10.0)
+    assert exact.v[-1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-14)
+
+
+@pytest.mark.skipif(not (PROBLEMS / "trajectories").exists(), reason="shared problem files are not here")
+def test_moreau_ball_reproduces_the_siconos_reference() -> None:
+    reference = np.loadtxt(PROBLEMS / "trajectories" / "BouncingBallTS.ref", skiprows=1)
+    ours = np.column_stack(moreau_jean(ball(0.9), [1.0], [0.0], 0.005, len(reference) - 1))
+    assert np.abs(ours[:, [0, 1, 2, 3, 3]] - reference[:, :5]).max() <= 1e-12
+
+
+def moreau(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
+    return moreau_jean(system, q, v, dt, steps)[1:3]
+
+
+def anitescu(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
+    states = [(np.array(q), np.array(v))]
+    for _ in range(steps):
+        at, moving = states[-1]
+        moved = rigid_step(system.mass_matrix, moving, system.force, dt, system.rows, system.gap(at),
+                           system.rows @ moving, system.restitution).velocity  # fmt: skip
+        states.append((at + dt * moved, moved))
+    return tuple(np.array(part) for part in zip(*states, strict=True))
+
+
+SCENES = {
+    "ball, e = 0.8": (ball(0.8), [1.0], [0.0], 1.3),
+    "ball, plastic": (ball(0.0), [1.0], [0.0], 0.8),
+    "block in a corner": (
+        LinearSystem(2.0 * np.eye(2), [1.0, -4.0], [[0.0, 1.0], [-1.0, 0.0]], [0.0, 1.0], 0.0),
+        [0.0, 0.25], [0.0, 0.0], 3.0,
+    ),
+    "cradle": (row_of_balls([1.0, 2.0, 1.0], 0.6), [0.0, 0.51, 1.23], [1.0, 0.0, -0.3], 2.0),
+}  # fmt: skip
+
+
+COARSE, FINE = (97, 130, 200, 231, 310), (1603, 2010, 2777, 3200, 4099)  # impacts fall anywhere in a step
+
+
+def error_per_step(scene: str, method: Callable, counts: tuple[int, ...]) -> np.ndarray:  # type: ignore[type-arg]
+    """Largest error divided by the step, over step counts: positions in the sup norm, velocities in L1."""
+    system, q, v, duration = SCENES[scene]
+    exact = event_driven(system, q, v, duration)
+    found = []
+    for n in counts:
+        dt = duration / n
+        stepped_q, stepped_v = method(system, q, v, dt, n)
+        true_q, true_v = exact.state(np.minimum(dt * np.arange(n + 1), exact.end))
+        found.append([np.abs(stepped_q - true_q).max() / dt, np.abs(stepped_v - true_v).sum(axis=0).max()])
+    return np.max(found, axis=0)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("method", [moreau, anitescu])
+def test_time_stepping_converges_at_first_order(scene: str, method: Callable) -> None:  # type: ignore[type-arg]
+    """The worst error divided by the step stays the same from some 200 to some 3000 steps (a factor 16)."""
+    coarse, fine = (error_per_step(scene, method, counts) for counts in (COARSE, FINE))
+    assert (fine <= 1.5 * coarse + 1e-9).all(), (coarse, fine)
+
+
+def test_the_law_of_the_impacts_is_the_callers() -> None:
+    def plastic(problem: ImpactProblem) -> Outcome:
+        return poisson(replace(problem, restitution=np.zeros(problem.contacts)))
+
+    system = row_of_balls([1.0, 1.0], 1.0)
+    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0).v[-1] == pytest.approx([0.0, 1.0])
+    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0, law=plastic).v[-1] == pytest.approx([0.5, 0.5])
+
+
+G = 9.81
+DROP = """
+name: drop
+dimensions: 3
+rate: 1000
+duration: 1
+gravity: [0, 0, -9.81]
+bodies:
+  - {name: ball, joint: free_flyer, mass: 0.5, inertia: [2e-4, 2e-4, 2e-4], shapes: [{kind: sphere, radius: 0.04}],
+     position: [0, 0, 0.24, 0, 0, 0, 1], velocity: [0.3, 0, 0, 2, 3, 1]}
+walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}]
+contact: {restitution: 0.6, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
+"""
+PENDULUM = """
+name: pendulum
+dimensions: 3
+rate: 1000
+duration: 1
+gravity: [0, 0, -9.81]
+bodies:
+  - {name: arm, joint: revolute, axis: [0, 1, 0], mass: 2, inertia: [1e-3, 0.03, 0.03], center_of_mass: [0.2, 0, 0],
+     shapes: [{kind: sphere, radius: 0.05, center: [0.4, 0, 0]}]}
+walls: [{name: wall, kind: half_space, point: [0, 0, -0.25], normal: [0, 0, 1]}]
+contact: {restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
+"""
+
+
+def test_a_dropped_ball_is_the_ball_of_the_exact_events() -> None:
+    """Two truths that share no code between events: arcs in closed form, and an integrator with root finding."""
+    exact = event_driven(LinearSystem([[0.5]], [-0.5 * G], [[1.0]], [0.0], 0.6), [0.2], [0.0], 0.5)
+    truth = scene_truth(scene_from_text(DROP), 0.5)
+    time = np.linspace(0.0, 0.5, 51)
+    assert truth.events == pytest.approx(exact.event_time[1:], abs=1e-9)
+    q, _ = truth.state(time)
+    assert q[:, 2] - 0.04 == pytest.approx(exact.state(time)[0][:, 0], abs=1e-9)
+    assert q[:, 0] == pytest.approx(0.3 * time, abs=1e-9)
+    assert np.linalg.norm(q[:, 3:], axis=1) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.4])
+def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(restitution: float) -> None:
+    """½ I ω² = m g l sin(angle) at sin(angle) = 0.2/0.4; then −e ω, or rest with the gap held closed."""
+    truth = scene_truth(scene_from_text(PENDULUM % restitution), 0.3)
+    inertia, angle = 0.03 + 2.0 * 0.2**2, np.arcsin(0.5)
+    speed = np.sqrt(2.0 * 2.0 * G * 0.2 * np.sin(angle) / inertia)
+    struck = truth.events[0]
+    before, after = truth.segments[0][2](struck), truth.segments[1][2](struck)
+    assert before == pytest.approx([angle, speed], rel=1e-9)
+    assert after == pytest.approx([angle, -restitution * speed], rel=1e-9, abs=1e-9)
+    if restitution == 0.0:
+        q, v = truth.state(np.linspace(struck, 0.3, 20))
+        assert q == pytest.approx(angle, abs=1e-9) and np.abs(v).max() <= 1e-9
+
+
+BOUNCING = """
+name: bouncing
+rate: 1000
+duration: 1
+gravity: [0, -9.81]
+bodies:
+  - {name: ball, joint: planar, mass: 0.5, inertia: 2e-4, shapes: [{kind: circle, radius: 0.04}],
+     position: [0, 0.09, 0], velocity: [0.3, 0, 0]}
+walls: [{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}]
+contact: {restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
+"""
+
+
+def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
+    """A ball from 5 cm, e = 0.5: it rests after 3 sqrt(2 h/g), infinitely many bounces later, and then slides on."""
+    truth = scene_truth(scene_from_text(BOUNCING % 0.5), 1.0)
+    rests = 3.0 * np.sqrt(2.0 * 0.05 / G)
+    falls = rests / 3.0 * (1.0 + 2.0 * (1.0 - 0.5 ** np.arange(len(truth.events))))
+    assert truth.events == pytest.approx(falls, abs=2.0 * truth.bound.instant)
+    assert truth.events[-1] == pytest.approx(rests, abs=6e-4)  # 2 v/g/(1 - e) of bounces below 1e-7 m
+    q, v = truth.state(np.linspace(rests, 1.0, 9))
+    assert q[:, 1] == pytest.approx(0.04, abs=truth.bound.position) and q[-1, 0] == pytest.approx(0.3, abs=1e-9)
+    assert np.abs(v[:, 1]).max() <= truth.bound.velocity
+
+
+def test_a_tumbling_body_keeps_energy_and_angular_momentum() -> None:
+    scene = load_scene(find_scene("tumbling_body"))
+    q, v = scene_truth(scene, 0.5).state(np.linspace(0.0, 0.5, 6))
+    inertia, mechanism = np.diag([1e-3, 2e-3, 2.8e-3]), System(scene).mechanism
+    axes = [mechanism.placements(model_of(mechanism).normalize(x))[0][0] for x in q]
+    momentum = [turn @ inertia @ w[3:] for turn, w in zip(axes, v, strict=True)]
+    assert np.ptp(momentum, axis=0) == pytest.approx(0.0, abs=1e-9 * 2e-3 * 6.0 * 10.0)
+    energy = [w[3:] @ inertia @ w[3:] for w in v]
+    assert energy == pytest.approx([energy[0]] * len(energy), rel=1e-9)
+
+
+@pytest.mark.parametrize(("given", "error", "says"), [
+    ((lambda: scene_from_text(DROP + "hand: {body: ball}\n"), 0.1, True), ArgumentError, "a scene without quaternions"),
+    ((lambda: load_scene(find_scene("box_stack")), 0.1), SolverError, "box_stack: .* contacts overlap"),
+    ((lambda: scene_from_text(BOUNCING % 0.97), 6.0, False, 20), SolverError, "impacts accumulate, 20 before"),
+])  # fmt: skip
+def test_refusals(given: Any, error: type[Exception], says: str) -> None:
+    make, *options = given
+    with pytest.raises(error, match=says):
+        scene_truth(make(), *options)
+
+
+ARM = """
+name: arm
+rate: 2000
+duration: 0.6
+gravity: [0, -9.81]
+bodies:
+  - {name: upper, joint: revolute, mass: 1.0, inertia: 0.01, center_of_mass: [0.2, 0], joint_limits: [-0.5, 1.0],
+     joint_damping: 0.3}
+  - {name: lower, parent: upper, joint: revolute, origin: [0.4, 0], mass: 0.5, inertia: 0.005,
+     center_of_mass: [0.15, 0], joint_limits: [-0.6, 0.4], velocity: [3.0]}
+contact: {stiffness: 2e5, damping: 60, restitution: 0.0}
+"""
+
+
+def limited_arm(**values: object) -> Scene:
+    return scene_from_text(ARM).with_values(values)
+
+
+@pytest.mark.parametrize("world", ["IAPB", "ideal"])
+def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str) -> None:
+    truth, errors = scene_truth(limited_arm(), 0.6), []
+    assert len(truth.events) >= 2  # both joints meet a limit
+    for rate in (1000.0, 4000.0):
+        stiffness = {"contact.forces": "paper", "contact.stiffness": 5e4 * rate / 1000.0}
+        run = run_world(limited_arm(rate=rate, **stiffness), world)
+        errors.append(float(np.abs(run.q - truth.state(run.time)[0]).max()))
+    assert errors[1] < 0.5 * errors[0] < (0.005 if world == "ideal" else 0.05)  # springs sag, too
+
+
+@pytest.mark.parametrize("damping", [1.0, 100.0, 900.0])
+def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
+    """m = 1 kg, e = 1: v⁺ = −v⁻ of the step's start, and damping divides it by 1 + dt D in the same step."""
+    run = run_world(scene_from_text(f"""
+name: slider
+rate: 1000
+duration: 0.005
+bodies:
+  - {{name: a, joint: prismatic, axis: [1, 0], mass: 1, inertia: 0.01, joint_damping: {damping},
+     joint_limits: [-9, 0.1], velocity: [1000]}}
+contact: {{restitution: 1}}
+"""), "ideal")
+    (step,), impacts = run.impacts.step, run.impacts
+    came = 1000.0 / (1.0 + 1e-3 * damping) ** step
+    assert impacts.v_minus[0] == run.v[step] == pytest.approx([came], rel=1e-12)
+    assert impacts.v_plus[0] == pytest.approx([-came], rel=1e-12)
+    assert run.v[step + 1] == pytest.approx([-came / (1.0 + 1e-3 * damping)], rel=1e-12)
+    assert certify(run).gains == 0 and np.abs(run.energy["impact_loss"]).max() <= 1e-12 * came**2
+    assert (np.diff(run.energy["friction_work"]) < 0.0).all()
+
+
+def test_blows_of_damped_joints_gain_nothing_and_a_huge_damping_holds_them() -> None:
+    damped = {"bodies.upper.joint_damping": 900.0, "bodies.lower.joint_damping": 5.0, "contact.restitution": 1.0}
+    run = run_world(limited_arm(gravity=None, **damped, duration=0.05, **{"bodies.lower.velocity": [300.0]}), "ideal")
+    lost = np.diff(run.energy["impact_loss"], prepend=0.0)[run.impacts.step]
+    assert len(lost) and (lost >= -1e-9).all() and (np.diff(run.energy["kinetic"]) <= 1e-9).all()
+    stiff = {"bodies.upper.joint_damping": 1e9, "bodies.lower.joint_damping": 1e9}
+    held = run_world(limited_arm(**stiff), "ideal-friction")
+    assert np.abs(held.q).max() < 2e-3 and (np.diff(held.energy["friction_work"]) <= 0.0).all()
+
+
+def test_every_world_takes_the_hands_force_over_time() -> None:
+    table = [[0.0, 0.0, 0.0, 0.0], [0.2, 0.2, 0.1, 0.0]]
+    scene = load_scene(find_scene("peg_corner")).with_values(
+        {"duration": 0.2, "hand.force": [0, 0, 0], "hand.force_table": table})
+    engine, rigid = simulate(scene), run_world(scene, "ideal")
+    assert np.array_equal(simulate(scene, world="IAPB").hand_force, rigid.hand_force)
+    assert rigid.hand_force[-1, 0] == pytest.approx(0.2 * (len(rigid.time) - 2) * scene.step / 0.2)
+    assert engine.hand_force[-1, 0] == rigid.hand_force[-1, 0]
+    with pytest.raises(ArgumentError, match="does not change over time"):
+        scene_truth(scene, 0.2)
