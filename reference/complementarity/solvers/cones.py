@@ -191,8 +191,9 @@ def _by_programs(problem: ImpactProblem, backend: str, settings: dict[str, Any])
         except cp.error.SolverError as error:
             return Answer(None, f"{backend}: {error}")
         impulse = None if p.value is None else np.asarray(p.value) * speed / root**2
-        if problem.friction is None or problem.relaxed or impulse is None:
-            return Answer(impulse, f"{backend}: {program.status}")
+        if impulse is None or problem.friction is None or problem.relaxed:
+            ended = f" in round {done}" if impulse is None and problem.friction is not None else ""
+            return Answer(impulse, f"{backend}: {program.status}{ended}")
         u = problem.contact_velocity(impulse).reshape(-1, problem.contact_size)
         slipping = np.where(problem.two_sided, 0.0, mu * np.linalg.norm(u[:, 1:], axis=1))
         before, shift = shift, slipping / speed
