@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.advice.checks import settled
-from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, count_pairs, decide_for
+from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, decide_for, facts_of
 from iapb.compiled import Entry, block, columns, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
@@ -20,7 +20,7 @@ from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
 from iapb.contact.kernels.unilateral import PushWork
-from iapb.contact.kernels.world import State, Stops, Switches, World
+from iapb.contact.kernels.world import State, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
@@ -79,11 +79,8 @@ class System:
         self.mechanism: Mechanism = mechanism_of(scene)
         self.shapes = shapes_of(scene)
         self.pairs = pairs_of(scene, self.shapes)
-        arrays, stops = self.mechanism.arrays, np.array(stops_of(scene, self.mechanism)).reshape(-1, 5).T.copy()
-        body, parent = stops[:2].astype(np.int64)
-        self.stops = Stops(body, parent, len(self.shapes.kind) + np.arange(len(body), dtype=np.int64),
-                           arrays.q_start[body], arrays.v_start[body], *stops[2:])
-        self.capacity = contact_capacity(self.shapes, self.pairs) + len(body)
+        self.stops = stops_of(scene, self.mechanism)
+        self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
         self.joint_damping, self.start = joint_damping_of(scene), start_of(scene)
         self.restitutions, self.frictions = restitutions_of(scene, self.pairs), frictions_of(scene)
         self.dt = 1.0 / scene.rate
@@ -93,7 +90,7 @@ class System:
         if scene.hand is not None:
             trees = self.mechanism.tree_of_body
             self.tool_tree = int(trees[self.mechanism.index(scene.hand.body)])
-            start = int(arrays.q_start[np.argmax(trees == self.tool_tree)])
+            start = int(self.mechanism.arrays.q_start[np.argmax(trees == self.tool_tree)])
             self.tool_dofs = self.mechanism.tree_dofs[self.tool_tree]
             self.tool_coordinates = start, start + self.device_mechanism().nq
         self._worlds: dict[Any, tuple[World, Entry]] = {}
@@ -262,9 +259,7 @@ class System:
 
     @cached_property
     def _facts(self) -> Facts:
-        frictions = np.unique(self.frictions.by_pair(self.pairs))
-        return Facts(self.mechanism, *count_pairs(self.mechanism, self.shapes, self.pairs),
-                     tuple(self.restitutions.tolist()), tuple(frictions.tolist()))
+        return facts_of(self.scene, self.mechanism, self.shapes, self.pairs)
 
 
 _SYSTEMS: dict[int, System] = {}  # the last used ones, by the identity of the scene, which the system keeps alive

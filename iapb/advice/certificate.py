@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.contact.kernels.passive import gain_signs
 from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
-from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run, digests
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.model import Scene, scene_kind
@@ -67,9 +67,9 @@ class Certificate:
     first_gain: int
     largest_gain: float
     momentum: float
-    span: float
-    restitution: float
-    counterexample: str
+    span: float = np.nan
+    restitution: float = np.nan
+    counterexample: str = ""
     total: float = np.nan
     restitution_judged: bool = False
 
@@ -127,20 +127,20 @@ def _finite(name: str, values: ArrayLike) -> Floats:
     return array
 
 
-def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Return M (1, d, d) or (n, d, d), v⁻ and v⁺ (n, d), checked."""
-    before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
-    masses = np.asarray(mass_matrix, np.float64)
+def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, **others: ArrayLike) -> list[Floats]:
+    """Return M (1, d, d) or (n, d, d), v⁻ and the others (n, d), checked."""
+    masses, before = _finite("mass_matrix", mass_matrix), np.atleast_2d(_finite("v_minus", v_minus))
     masses = masses[None] if masses.ndim == 2 else masses
     if before.ndim != 2:
         raise ArgumentError("v_minus", before.shape, "shape (n, d), or (d,) of one impact")
     n, d = before.shape
-    if after.shape != (n, d):
-        raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
+    vectors = [np.atleast_2d(_finite(name, given)) for name, given in others.items()]
+    for name, each in zip(others, vectors, strict=True):
+        if each.shape != (n, d):
+            raise ArgumentError(name, each.shape, f"shape {before.shape}, as v_minus")
     if masses.shape not in ((1, d, d), (n, d, d)):
         raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
-    M, v, w = (_finite("v_minus, v_plus or mass_matrix", each) for each in (masses, before, after))
-    return M, v, w
+    return [masses, before, *vectors]
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
     IapbError
         The bound and the integers disagree, so this program or the processor has a fault.
     """
-    masses, before, after = _impacts(mass_matrix, v_minus, v_plus)
+    masses, before, after = _impacts(mass_matrix, v_minus, v_plus=v_plus)
     signs = np.empty(len(before), np.int64)
     gain_signs(masses, before, after, signs)
     gained, unsure, checked = signs > 0, np.flatnonzero(signs == 0), np.flatnonzero(signs)[::_CHECKED]
@@ -209,17 +209,19 @@ def certify(run: Run) -> Certificate:
     total = _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
     if not len(table.step):
         return _certificate([], total=total)
-    scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
-    mechanism = mechanism_of(scene)
-    span, restitution = _contacts(run, scene, mechanism)
+    span, restitution = _contacts(run)
     every_row = bool((table.rank >= table.rows).all())  # a row budget drops rows, and the record does not say why
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
-    return _certificate(_batches(run, mechanism), span, restitution, total, judged)
+    return _certificate(_batches(run), total=total, span=span, restitution=restitution, restitution_judged=judged)
 
 
-def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
+def _scene_of(run: Run) -> Scene:
+    return scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
+
+
+def _batches(run: Run) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
     """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of `_BATCH`."""
-    table = run.impacts
+    table, mechanism = run.impacts, mechanism_of(_scene_of(run))
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
         masses = mechanism.mass_matrices(run.q[table.step[chosen]])
@@ -232,8 +234,7 @@ def _batches(run: Run, mechanism: Mechanism) -> Iterator[tuple[Floats, Floats, F
 
 def exported_run(run: Run) -> Iterator[str]:
     """Yield the impacts of a run as the lines of `exported`."""
-    mechanism = mechanism_of(scene_kind(run.scene_resolved).model_validate(run.scene_resolved))
-    for mass_matrix, v_minus, v_plus, _ in _batches(run, mechanism):
+    for mass_matrix, v_minus, v_plus, _ in _batches(run):
         yield from exported(mass_matrix, v_minus, v_plus)
 
 
@@ -244,7 +245,7 @@ def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> I
     rounded. A complete file starts with `EXPORT_HEAD` and ends with "end" and the number of impacts. The arguments are
     those of `judge_gains`, for n impacts.
     """
-    masses, before, after = _impacts(mass_matrix, v_minus, v_plus)
+    masses, before, after = _impacts(mass_matrix, v_minus, v_plus=v_plus)
     masses = np.broadcast_to(masses, (len(before), *masses.shape[1:]))
     for mass, *velocities in zip(masses, before, after, strict=True):
         mantissas, exponents = np.frexp(np.concatenate((mass.ravel(), *velocities)))
@@ -274,31 +275,28 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
     return _certificate([(mass_matrix, v_minus, v_plus, impulse)])
 
 
-def _certificate(batches: Iterable[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike | None]], span: float = np.nan,
-                 restitution: float = np.nan, total: float = np.nan, restitution_judged: bool = False) -> Certificate:
+def _certificate(batches: Iterable[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike | None]], **known: Any
+                 ) -> Certificate:
     """Judge impacts in batches of M, v⁻, v⁺ and impulse, and join what else is known of them."""
     judged, largest, momentum, first, shown = [Judged(np.zeros(0, np.bool_), 0, 0)], 0.0, np.nan, -1, ""
     for mass_matrix, v_minus, v_plus, impulse in batches:
-        masses, before, after = _impacts(mass_matrix, v_minus, v_plus)
+        given = {"v_plus": v_plus} | ({} if impulse is None else {"impulse": impulse})
+        masses, before, after, *recorded = _impacts(mass_matrix, v_minus, **given)
         done = sum(len(one.gained) for one in judged)
         judged.append(judge_gains(masses, before, after))
         for k in np.flatnonzero(judged[-1].gained).tolist():
             one = masses[k % len(masses)], before[k], after[k]
             largest = max(largest, relative_gain(*one))
             first, shown = (first, shown) if first >= 0 else (done + k, _shown(*one))
-        if impulse is not None and len(before):
-            recorded = _finite("impulse", np.atleast_2d(np.asarray(impulse, np.float64)))
-            if recorded.shape != before.shape:
-                raise ArgumentError("impulse", recorded.shape, f"shape {before.shape}, as v_minus")
+        if recorded and len(before):
             with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
                 change = (after - before)[:, :, None]
-                size = np.matmul(np.abs(masses), np.abs(change))[:, :, 0].sum(axis=1) + np.abs(recorded).sum(axis=1)
-                error = np.abs(np.matmul(masses, change)[:, :, 0] - recorded).sum(axis=1)
-            momentum = np.fmax(momentum, _largest_share(error, size))
+                size = np.matmul(np.abs(masses), np.abs(change))[:, :, 0].sum(axis=1) + np.abs(recorded[0]).sum(axis=1)
+                error = np.abs(np.matmul(masses, change)[:, :, 0] - recorded[0]).sum(axis=1)
+            momentum = float(np.fmax(momentum, _largest_share(error, size)))
     gained = np.concatenate([one.gained for one in judged])
     return Certificate(len(gained), int(gained.sum()), sum(one.by_integers for one in judged),
-                       sum(one.checked for one in judged), first, largest, float(momentum), span, restitution, shown,
-                       total, restitution_judged)
+                       sum(one.checked for one in judged), first, largest, momentum, counterexample=shown, **known)
 
 
 def _largest_share(error: Floats, size: Floats) -> float:
@@ -332,13 +330,12 @@ print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gaine
 """
 
 
-def _contacts(run: Run, scene: Scene, mechanism: Mechanism) -> tuple[float, float]:
+def _contacts(run: Run) -> tuple[float, float]:
     """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot decide."""
-    table, impacts = run.contacts, run.impacts
-    frictionless = not (run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0.0)
-    if not frictionless or scene.contact.self_collision_rows == "per_body":
-        return np.nan, np.nan
-    if run.law not in ENGINE_LAWS and not table.impulse.any():  # another world may not record contact impulses
+    table, impacts, scene = run.contacts, run.impacts, _scene_of(run)
+    mechanism, rubbing = mechanism_of(scene), run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
+    unrecorded = run.law not in ENGINE_LAWS and not table.impulse.any()  # another world may not record them
+    if rubbing or unrecorded or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
     equality = len(values) == 1 and not run.law_settings.get("pushing")

@@ -22,28 +22,11 @@ from numpy.typing import NDArray
 
 from iapb.advice.solids import joined, solids_of
 from iapb.compiled import block
-from iapb.contact.geometry import (
-    BOX,
-    ENDLESS,
-    ContactBuffer,
-    contact_capacity,
-    frame_along,
-    make_contact_buffer,
-)
+from iapb.contact import geometry, laws
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.laws import FRICTION, IMPACT_FRICTION, IMPULSES, PENALTY, ContactLaw, ImpulseAugmented
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import in_metres
-from iapb.scene import Scene, SpatialScene
-from iapb.scene.mechanism import (
-    frictions_of,
-    mechanism_of,
-    pairs_of,
-    restitution_by_pair,
-    shapes_of,
-    start_of,
-    stops_of,
-)
+from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.parts import LARGEST_NUMBER
 
 Floats = NDArray[np.float64]
@@ -55,7 +38,7 @@ SHIFTED = 0.05  # of the smaller shape: distance by which friction in an impact 
 SAG = 0.1  # of the smaller shape, or of a joint's range: largest static sag of a rigid contact
 THROWN = 1.0  # largest k = K Δt²/m at which a new contact returns no more energy than it absorbs
 ROUNDED = 1e-9  # relative rounding error of a limit
-MANY_TURNS = 45  # a joint may turn often, so only multiples of this many radians count as degrees
+MANY_TURNS = 45  # a joint may turn often, so only multiples of this many radians (seven turns) count as degrees
 MANY_PAIRS = 2000  # with more pairs, only those closer than the largest body are checked
 
 
@@ -95,44 +78,42 @@ class Start:
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
-        self.mechanism, self.shapes, (self.q, self.v) = mechanism_of(scene), shapes_of(scene), start_of(scene)
-        self.pairs, self.stops = pairs_of(scene, self.shapes), stops_of(scene, self.mechanism)
+        self.mechanism, (self.q, self.v) = mechanism.mechanism_of(scene), mechanism.start_of(scene)
+        self.shapes = mechanism.shapes_of(scene)
+        self.pairs, self.stops = mechanism.pairs_of(scene, self.shapes), mechanism.stops_of(scene, self.mechanism)
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [wall.name for wall in scene.walls]
         solids, trees = solids_of(self.shapes), self.mechanism.tree_of_body
         size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
-        for stop in self.stops:
-            body = scene.bodies[stop.body]
-            self.labels.append(f"the {'lower' if stop.sign > 0.0 else 'upper'} limit of {body.name}")
-            size.append(stop.arm * float(np.ptp(body.joint_limits or (0.0,))))
-        self.kind, self.radius = (np.append(each, np.full(len(self.stops), -1))
-                                  for each in (self.shapes.kind, self.shapes.radius))
+        for b, sign, arm in zip(self.stops.body.tolist(), self.stops.sign, self.stops.arm.tolist(), strict=True):
+            self.labels.append(f"the {'lower' if sign > 0.0 else 'upper'} limit of {scene.bodies[b].name}")
+            size.append(arm * float(np.ptp(scene.bodies[b].joint_limits or (0.0,))))
+        none = np.full(len(self.stops.body), -1)
+        self.kind, self.radius = np.append(self.shapes.kind, none), np.append(self.shapes.radius, none)
         # contacts: trees (at a wall twice the same), Jacobian rows J (c, d), friction, thickness of the thinner
-        self.found = found = self._contacts(size[: len(size) - len(self.stops)])
+        self.found = found = self._contacts(size[: len(self.shapes.kind)])
         self.tree_a, self.tree_b = trees[found.body_a], trees[np.where(found.body_b < 0, found.body_a, found.body_b)]
         self.rows = self.rows_along(np.arange(len(found.gap)), found.normal)
-        for row, stop in zip(self.rows[len(self.rows) - len(self.stops) :], self.stops, strict=True):
-            row[self.mechanism.arrays.v_start[stop.body]] = stop.arm * stop.sign
-        classes, table = frictions_of(scene)
+        self.first_stop = len(self.rows) - len(none)
+        self.rows[np.arange(self.first_stop, len(self.rows)), self.stops.dof] = self.stops.arm * self.stops.sign
+        classes, table = mechanism.frictions_of(scene)
         self.friction = table[classes[found.shape_a], classes[found.shape_b]]
         self.size = np.array(size)
         self.thickness = np.minimum(self.size[found.shape_a], self.size[found.shape_b])
 
-    def _contacts(self, sizes: list[float]) -> ContactBuffer:
+    def _contacts(self, sizes: list[float]) -> geometry.ContactBuffer:
         """Return the contacts between the closest features of each pair, near or far, and those of joint limits."""
         few, kind, places = len(self.pairs) <= MANY_PAIRS, self.shapes.kind, self.mechanism.placements(self.q)
-        corners = np.where(kind == BOX, 8, np.maximum(self.shapes.count, 2))
-        room = int(corners[self.pairs].sum()) + 32 if few else contact_capacity(self.shapes, self.pairs)
+        corners = np.where(kind == geometry.BOX, 8, np.maximum(self.shapes.count, 2))
+        room = int(corners[self.pairs].sum()) + 32 if few else geometry.contact_capacity(self.shapes, self.pairs)
         margin = math.inf if few else max((size for size in sizes if size < math.inf), default=0.0)
-        out = make_contact_buffer(room + len(self.stops))
+        out, stops = geometry.make_contact_buffer(room + len(self.stops.body)), self.stops
         count = max(int(detect(block(self.shapes), self.pairs, *places, margin, out)), 0) if len(self.pairs) else 0
-        for k, stop in enumerate(self.stops):
-            i, place = count + k, self.q[self.mechanism.arrays.q_start[stop.body]]
-            out.gap[i], out.normal[i] = stop.arm * stop.sign * (place - stop.bound), 0.0
-            out.shape_a[i] = out.shape_b[i] = len(kind) + k
-            out.body_a[i], out.body_b[i], out.point[i] = stop.body, stop.parent, places[1][stop.body]
-        columns: list[Any] = [column[: count + len(self.stops)] for column in out]
-        return ContactBuffer(*columns)
+        new = slice(count, count + len(stops.body))
+        out.gap[new], out.normal[new] = stops.arm * stops.sign * (self.q[stops.coordinate] - stops.bound), 0.0
+        out.shape_a[new] = out.shape_b[new] = stops.shape
+        out.body_a[new], out.body_b[new], out.point[new] = stops.body, stops.parent, places[1][stops.body]
+        return geometry.ContactBuffer(*(column[: new.stop] for column in out))  # type: ignore[arg-type]
 
     def rows_along(self, contacts: Rows, directions: Floats) -> Floats:
         """Return the Jacobian rows (k, d) of contacts (k,) along directions (k, 3)."""
@@ -144,7 +125,7 @@ class Start:
     def slips(self, i: int) -> Floats:
         """Jacobian rows of contact i across its normal: one in the plane, two in space."""
         n = self.found.normal[i]
-        across = frame_along(n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
+        across = geometry.frame_along(n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
         return self.rows_along(np.full(len(across), i), across)
 
     @cached_property
@@ -229,13 +210,10 @@ class Start:
 
     @cached_property
     def critical(self) -> tuple[tuple[float, Rows], tuple[float, Rows]]:
-        """Largest mobility [1/kg] and its contacts, twice: over touching groups and near pairs, and over near pairs.
-
-        The row of a near pair is also valid at touch; two boxes in space must be near for that.
-        """
+        """Largest mobility [1/kg] and its contacts, twice: over touching groups and near pairs, and over near pairs."""
         nobody = (0.0, np.zeros(0, np.int64))
-        boxes = (self.kind[self.found.shape_a] == BOX) & (self.kind[self.found.shape_b] == BOX)
-        near = ~boxes | (self.found.gap <= self.thickness)
+        boxes = (self.kind[self.found.shape_a] == geometry.BOX) & (self.kind[self.found.shape_b] == geometry.BOX)
+        near = ~boxes | (self.found.gap <= self.thickness)  # so that the row is valid at touch
         meeting = [(self.mobility(self.rows[rows]), rows) for rows in self.by_pair if near[rows[0]]]
         lasting = [(self.mobility(self.rows[rows]), rows) for rows in self.touching]
         return (max([*lasting, *meeting], key=lambda one: one[0], default=nobody),
@@ -293,7 +271,7 @@ def _largest(good: Callable[[float], bool], high: float) -> float:
     return low if low > 1e-9 * high else 0.0
 
 
-def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, ...]:
+def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Caution, ...]:
     """Find mistakes that would make a run of this scene meaningless, without running it.
 
     Parameters
@@ -306,38 +284,36 @@ def check_scene(scene: Scene, law: ContactLaw | None = None) -> tuple[Caution, .
     tuple of Caution
         Empty if nothing is wrong.
     """
-    chosen: Any = ImpulseAugmented() if law is None else law
+    chosen: Any = laws.ImpulseAugmented() if law is None else law
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
     start, uses = Start(settled(scene)[0]), frozenset[str](getattr(chosen, "uses", ()))
     found = [*_degrees(scene), *_overlaps(start), *_fast(start)]
-    if PENALTY in uses:
+    if laws.PENALTY in uses:
         found += _sags(start)
-    if PENALTY in uses and scene.contact.forces == "paper":
-        found += _too_stiff(start, getattr(chosen, "integrator", "semi_implicit_euler"))
-        found += _overdriven_friction(start) if FRICTION in uses else ()
-    if IMPULSES in uses and IMPACT_FRICTION not in uses and start.scene.contact.self_collision_rows == "relative":
+    integrator = getattr(chosen, "integrator", "semi_implicit_euler")
+    if laws.PENALTY in uses and scene.contact.forces == "paper":
+        found += _too_stiff(start, integrator)
+        found += _overdriven_friction(start) if laws.FRICTION in uses else ()
+    elif laws.PENALTY in uses and start.spatial and len(start.pairs) and integrator != "momentum":
+        found.append(Caution("integrator", scene.name, "implicit contact in space can gain energy with the integrator "
+                             f"{integrator}: set integrator: momentum, or contact.forces: paper"))
+    frictionless = laws.IMPULSES in uses and laws.IMPACT_FRICTION not in uses
+    if frictionless and scene.contact.self_collision_rows == "relative":
         found += _slips_through_impacts(start)
     return tuple(found)
 
 
 def _degrees(scene: Scene) -> Iterator[Caution]:
-    """Warn of angles that look like degrees: whole numbers beyond one turn.
-
-    Such numbers are not plausible in radians: a placement needs at most one turn, and an angle copied from the end of
-    another run is rarely a whole number. A joint may turn several times, so its start and limits raise a warning only
-    if they are multiples of 45 (45 rad are seven turns).
-    """
-    angles: list[tuple[tuple[str | int, ...], float, int]] = []  # path, value [rad], what degrees are multiples of
-    plain = scene.resolved()
-    for part in ("bodies", "walls"):
-        for i, one in enumerate(plain[part]):
-            shapes = [((part, i, "shapes", k), shape) for k, shape in enumerate(one.get("shapes", ()))]
-            for path, placed in [((part, i), one), *shapes]:
-                angles += [((*path, "angle"), placed["angle"], 1)] if "angle" in placed else []
-                angles += [((*path, "rpy", k), x, 1) for k, x in enumerate(placed.get("rpy", ()))]
+    """Warn of angles that look like degrees: whole numbers beyond one turn, in joints multiples of 45."""
+    placed: list[tuple[tuple[str | int, ...], Any]] = []  # path, and what has angles
+    for part, things in (("bodies", scene.bodies), ("walls", scene.walls)):
+        for i, one in enumerate(things):
+            shapes = enumerate(getattr(one, "shapes", ()))
+            placed += [((part, i), one), *(((part, i, "shapes", k), shape) for k, shape in shapes)]
+    angles = [((*path, "angle"), one.angle, 1) for path, one in placed if hasattr(one, "angle")]  # with its unit
+    angles += [((*path, "rpy", k), x, 1) for path, one in placed for k, x in enumerate(getattr(one, "rpy", ()))]
     for i, body in enumerate(scene.bodies):
-        if body.joint == "planar" and len(body.position) == 3:
-            angles.append((("bodies", i, "position", 2), body.position[2], 1))
+        angles += [(("bodies", i, "position", 2), body.position[2], 1)] if body.joint == "planar" else []
         for field in ("position", "joint_limits") if body.joint == "revolute" else ():
             angles += [(("bodies", i, field, k), x, MANY_TURNS) for k, x in enumerate(getattr(body, field) or ())]
     for path, angle, unit in angles:
@@ -362,7 +338,7 @@ def _overlaps(start: Start) -> Iterator[Caution]:
         kind, says = "overlap", f"{a} starts {in_metres(depth)} inside {b}, and "
         out = ", ".join(f"{depth * x:.3g}" for x in found.normal[i][: 3 if start.spatial else 2])
         remedy = f": move it by [{out}] m"
-        if start.kind[found.shape_b[i]] in ENDLESS and depth >= start.thickness[i]:
+        if start.kind[found.shape_b[i]] in geometry.ENDLESS and depth >= start.thickness[i]:
             kind, says = "outside", f"{a} starts behind {b}, {in_metres(depth)} deep"
         elif float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0]) <= 1e-12 * start.critical[0][0]:
             says, remedy = f"{says}no joint can move it out", f"{remedy}, or take the shape or the wall away"
@@ -406,13 +382,9 @@ def _fast(start: Start) -> Iterator[Caution]:
 
 
 def _slips_through_impacts(start: Start) -> Iterator[Caution]:
-    """Warn of a free body that slides as it lands, if friction in the impact would change its path visibly.
-
-    Only the first contact of each free body counts. Linkages are left out, for their poses change on the way, and so is
-    a body that the hand holds. Friction in the impact would reduce the slip by up to Δv = μ (1 + e) v_n. Without it,
-    resting friction removes the same slip within Δv/(μ a), where a is the acceleration onto the wall. A body that
-    bounces keeps the slip during its flight of 2 e v_n/a.
-    """
+    """Warn of a free body that slides as it first lands, if friction in the impact would change its path visibly."""
+    # Friction in the impact would reduce the slip by up to Δv = μ (1 + e) v_n. Without it, resting friction removes the
+    # same slip within Δv/(μ a), a the acceleration onto the wall; a bounce keeps it for a flight of 2 e v_n/a.
     scene, found, first = start.scene, start.found, dict[int, tuple[float, int]]()  # tree -> time, contact
     trees, held = start.mechanism.tree_of_body.tolist(), scene.hand.body if scene.hand is not None else ""
     free = {tree for tree, body in zip(trees, scene.bodies, strict=True)
@@ -426,7 +398,7 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
         if time >= scene.duration or start.friction[i] == 0.0:
             continue
         speed, mu, left = float(start.meeting[1][i]), float(start.friction[i]), scene.duration - time
-        e = float(restitution_by_pair(scene, np.array([[found.shape_a[i], found.shape_b[i]]]))[0])
+        e = float(mechanism.restitution_by_pair(scene, np.array([[found.shape_a[i], found.shape_b[i]]]))[0])
         slip = float(np.linalg.norm(start.slips(i) @ (start.v + time * start.fall)))
         change, force = min(mu * (1.0 + e) * speed, slip), -float(start.pull[i])
         lasts = left if force <= 0.0 else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
@@ -453,22 +425,17 @@ def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
 
 
 def _sags(start: Start) -> Iterator[Caution]:
-    """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at a joint limit.
-
-    At a joint limit that does not touch, the force balances the load of its own joint, moved to the limit, as if the
-    joints behind it were fixed.
-    """
-    K, arrays, found = start.scene.contact.stiffness, start.mechanism.arrays, [(0.0, -1)]
+    """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at a joint limit."""
+    K, stops, found = start.scene.contact.stiffness, start.stops, [(0.0, -1)]
     for rows in start.supports if K > 0.0 else ():
         shares = start.loads(rows) / (K * start.thickness[rows])
         found.append((float(shares.max()), int(rows[shares.argmax()])))
     touching = {int(i) for rows in start.touching for i in rows}
-    for i, stop in enumerate(start.stops, len(start.rows) - len(start.stops)):
+    for k, i in enumerate(range(start.first_stop, len(start.rows)) if K > 0.0 else ()):
         there = start.q.copy()
-        there[arrays.q_start[stop.body]] = stop.bound
-        load = -stop.sign * float(start.applied(there)[arrays.v_start[stop.body]]) / stop.arm
-        if K > 0.0 and i not in touching:
-            found.append((load / (K * float(start.thickness[i])), i))
+        there[stops.coordinate[k]] = stops.bound[k]  # the joint is at its limit, and those behind it are fixed
+        load = -float(stops.sign[k] * start.applied(there)[stops.dof[k]] / stops.arm[k])
+        found += [(load / (K * float(start.thickness[i])), i)] if i not in touching else []
     share, i = max(found)
     if share <= SAG:
         return
@@ -518,10 +485,7 @@ _UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
 
 
 def settled(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with the values that `contact.auto` and `contact.resting_start` choose, and remarks on them.
-
-    A scene that uses neither is returned unchanged.
-    """
+    """Return the scene with the values that the toolkit chooses, unchanged if there are none, and remarks on them."""
     said: tuple[str, ...] = ()
     if scene.contact.auto:
         choice, said = _chosen(Start(scene))
@@ -533,11 +497,8 @@ def settled(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
 
 
 def _firm(scene: Scene) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return stiffness and damping of implicit contact that are not given, and a sentence on them.
-
-    The stiffness holds ten times the weight of all bodies and the hand's largest force, at the sag allowed.
-    """
-    sag = min([SAG_ALLOWED, *(SAG_SHARE * solid.thin for solid in solids_of(shapes_of(scene)).values())])
+    """Return stiffness and damping of implicit contact that are not given, and a sentence on them."""
+    sag = min([SAG_ALLOWED, *(SAG_SHARE * solid.thin for solid in solids_of(mechanism.shapes_of(scene)).values())])
     load = sum(body.mass for body in scene.bodies) * max(STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,))))
     load += scene.hand.largest_force(scene.duration) if scene.hand is not None else 0.0
     K, choice = scene.contact.stiffness, dict[str, float]()
@@ -597,7 +558,7 @@ def _at_rest(scene: Scene, said: tuple[str, ...]) -> tuple[Scene, tuple[str, ...
     for _ in range(SETTLING):
         found = _sunk(Start(settling))
         if not found:
-            moved = float(np.abs(start_of(settling)[0] - start_of(scene)[0]).max())
+            moved = float(np.abs(mechanism.start_of(settling)[0] - mechanism.start_of(scene)[0]).max())
             return settling, (*said, f"contact.resting_start moved what touches by up to {moved:.3g} m, rad")
         if isinstance(found, str):
             why = found
@@ -607,12 +568,9 @@ def _at_rest(scene: Scene, said: tuple[str, ...]) -> tuple[Scene, tuple[str, ...
 
 
 def _sunk(start: Start) -> dict[str, Any] | str:
-    """Do one Newton step towards equilibrium; return new positions by path, or the reason why there is none.
-
-    The result is empty at equilibrium. Springs and friction λ balance the load f: K JᵀJ δ + Tᵀλ = f − K Jᵀg. The
-    solution with the least √K δ and λ/√K is taken, so that nothing moves along its contacts. No contact may pull, and
-    the sum of the friction forces must not exceed the sum of μ N.
-    """
+    """Do one Newton step to equilibrium: return new positions by path, none if it is reached, or why there is none."""
+    # Springs and friction λ balance the load f: K JᵀJ δ + Tᵀλ = f − K Jᵀg, with the least √K δ and λ/√K, so that
+    # nothing moves along its contacts. No contact may pull, and the friction forces must not exceed μ N in sum.
     if not start.touching or start.scene.contact.stiffness == 0.0:
         return "nothing touches, or no spring holds it"
     rows, K, trees = np.concatenate(start.touching), start.scene.contact.stiffness, start.mechanism.tree_of_body

@@ -95,10 +95,7 @@ class _Book(NamedTuple):
 
 
 def _energy(seen: _Seen) -> Iterator[str]:
-    """Say where energy exceeds the energy at the start plus the work done, or what the motion of one tree creates.
-
-    Then say if friction did positive work on the bodies of the scene, or on those that touch one another.
-    """
+    """Say where energy exceeds that of the start plus the work done, and whether friction did positive work."""
     books = list(_books(seen))
     for book in books:
         k = int(np.argmax(book.excess))
@@ -165,10 +162,7 @@ def _at_hand(energy: dict[str, Floats]) -> float:
 
 
 def _spun(seen: _Seen) -> Iterator[str]:
-    """Say which single body changes its spin or its speed, gravity apart, in steps in which no force acts on it.
-
-    Bodies with a planar or free_flyer joint count that carry nothing and have no joint damping.
-    """
+    """Say which free body that carries nothing changes its spin or speed, gravity apart, while no force acts on it."""
     run, begin, start, parents = seen.run, seen.begin, 0, {body.parent for body in seen.bodies}
     forces = [run.impulse, *(getattr(run, f"{name}_force") for name in FORCES)]
     for b, body in enumerate(seen.bodies):
@@ -217,13 +211,7 @@ def _sank(seen: _Seen) -> Iterator[str]:
 
 
 def _passed(seen: _Seen) -> Iterator[str]:
-    """Say which body is the first to pass through a wall or another body within one step.
-
-    For each pair of shapes that may touch, centre and corners of one move straight in the frame of the other from one
-    state to the next, and pass if they enter and leave it (`Solid.crossed`). Balls and circles have no corners. This
-    misses edges that cross in space with no corner or centre in the other shape, a ball that passes a corner beside its
-    centre, and paths that a turn bends by half of a shape. `_sank` looks at half-spaces and what takes several steps.
-    """
+    """Say which body is the first to pass through a wall or another body within one step (see `_crosses`)."""
     run, first, said = seen.run, seen.run.steps, ""
     moved = np.zeros((run.steps, len(seen.sizes)))  # how far any point of each body moves [m]; last, the world
     for b in range(len(run.body_names)):
@@ -249,7 +237,7 @@ def _passed(seen: _Seen) -> Iterator[str]:
 
 
 def _crosses(run: Run, one: Solid, other: Solid, k: Integers) -> Booleans:
-    """Whether a point of one shape passes through another in each of the steps k."""
+    """Whether the centre or a corner of one shape, moving straight in the frame of another, enters and leaves it."""
     ours, theirs = ([_frames(run, solid.body, at) for at in (k, k + 1)] for solid in (one, other))
     before, after = ((one.points @ np.swapaxes(turned, 1, 2) + (at - origin)[:, None]) @ turn
                      for (turned, at), (turn, origin) in zip(ours, theirs, strict=True))
@@ -278,15 +266,11 @@ def _frames(run: Run, body: int, at: Integers) -> tuple[Floats, Floats]:
 
 
 def _squeezed(seen: _Seen) -> Iterator[str]:
-    """Say which body moves on by more than its size in a gap that is a tenth of its size too narrow.
-
-    Two opposed contacts of a body with walls then overlap by so much in sum, and one of them by half of it.
-    """
+    """Say which body moves on by more than its size in a gap that is a tenth of its size too narrow."""
     run, table = seen.run, seen.run.contacts
     for b, size in enumerate(seen.sizes[:-1].tolist()):
-        mine = (table.body_a == b) & (table.body_b < 0)
-        rows = np.flatnonzero(mine & (table.gap < 0.0))
-        if not (table.gap[rows] < -0.5 * NARROW * size).any():
+        rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
+        if not (table.gap[rows] < -0.5 * NARROW * size).any():  # of two opposed contacts one has half of the overlap
             continue
         step, caught, widest = np.searchsorted(table.offsets, rows, "right") - 1, [np.zeros(0, np.int64)], 0.0
         for apart in range(1, int(np.bincount(step - step[0]).max())):  # the contacts of a step are consecutive
@@ -299,8 +283,8 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
         places = _places(run)[np.unique(np.concatenate(caught)), b]
         far = float(np.linalg.norm(places - places[:1], axis=1).max(initial=0.0))
         if far > size:
-            wide = in_metres(widest)
-            yield f"{run.body_names[b]} goes on by {in_metres(far)} in a gap that is {wide} narrower than it"
+            yield (f"{run.body_names[b]} goes on by {in_metres(far)} in a gap that is {in_metres(widest)} narrower "
+                   "than it")
             return
 
 

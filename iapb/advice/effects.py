@@ -339,18 +339,16 @@ def decide_effects(
     """
     scene, _ = settled(scene)
     mechanism, shapes = mechanism_of(scene), shapes_of(scene)
-    pairs = pairs_of(scene, shapes)
-    values = (np.unique(each).tolist() for each in (restitutions_of(scene, pairs), frictions_of(scene).by_pair(pairs)))
-    facts = Facts(mechanism, *count_pairs(mechanism, shapes, pairs), *map(tuple, values))
-    return decide_for(scene, facts, law, coupling, rendering)
+    return decide_for(scene, facts_of(scene, mechanism, shapes, pairs_of(scene, shapes)), law, coupling, rendering)
 
 
-def count_pairs(mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32]) -> tuple[int, int, int]:
-    """Return the numbers of candidate pairs with walls, between two trees, and within one tree."""
+def facts_of(scene: Scene, mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32]) -> Facts:
+    """Return the facts of a scene from its mechanism, shapes and candidate pairs (k, 2)."""
     body_a, body_b = shapes.body[pairs.T]
-    same = mechanism.tree_of_body[body_a] == mechanism.tree_of_body[body_b]
-    wall = body_b < 0
-    return int(wall.sum()), int((~wall & ~same).sum()), int((~wall & same).sum())
+    wall, same = body_b < 0, mechanism.tree_of_body[body_a] == mechanism.tree_of_body[body_b]
+    to_walls, between, within = (int(each.sum()) for each in (wall, ~wall & ~same, ~wall & same))
+    restitutions, frictions = restitutions_of(scene, pairs), np.unique(frictions_of(scene).by_pair(pairs))
+    return Facts(mechanism, to_walls, between, within, tuple(restitutions.tolist()), tuple(frictions.tolist()))
 
 
 def decide_for(

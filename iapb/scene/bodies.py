@@ -178,7 +178,8 @@ Shapes = Annotated[tuple[V, ...], Field(max_length=MAX_SHAPES_OF_BODY,
                                         description="what can touch; none: the body passes through everything")]
 JointDamping = Annotated[
     tuple[NonNegative, ...],
-    BeforeValidator(lambda given: (given,) if isinstance(given, int | float) else given),
+    BeforeValidator(lambda given: (given,) if isinstance(given, int | float) else given,
+                    json_schema_input_type=NonNegative | tuple[NonNegative, ...]),
     Field(description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none"),
 ]
 Inertia = Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tuple[Vector3, Vector3, Vector3]

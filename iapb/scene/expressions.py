@@ -109,6 +109,7 @@ def _checked(text: str) -> str:
 
 Expression = Annotated[
     Text,
-    BeforeValidator(lambda given: repr(given) if type(given) in (int, float) else given),
+    BeforeValidator(lambda given: repr(given) if type(given) in (int, float) else given,
+                    json_schema_input_type=float | Text),
     AfterValidator(_checked),
 ]

@@ -7,15 +7,14 @@ depend on the processor.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
-from iapb.elementary import sine_cosine
+from iapb.contact.kernels.world import Stops
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Joint
@@ -27,10 +26,6 @@ from iapb.scene.model import Scene, SpatialScene
 Floats = NDArray[np.float64]
 Pairs = NDArray[np.int32]
 
-_MECHANICAL = ("name", "parent", "joint", "axis", "origin", "angle", "rpy", "center_of_mass", "mass", "inertia")
-_KEPT = 8
-_MECHANISMS: dict[str, Mechanism] = {}  # by the bodies' mechanical fields as text
-
 UNSTATED = 2.0  # larger than any restitution, so that the minimum of two is a given one
 
 
@@ -38,23 +33,9 @@ def mechanism_of(scene: Scene) -> Mechanism:
     """Return the scene's bodies as a mechanism, in the scene's order; q concatenates their positions.
 
     A planar moment of inertia I about z becomes diag(I/2, I/2, I), the inertia of a flat body, so that the spatial
-    engine gets a physical inertia. Motion in the plane depends on its zz entry alone. Scenes with identical bodies
-    share one mechanism, because a mechanism never changes.
+    engine gets a physical inertia. Motion in the plane depends on its zz entry alone.
     """
-    said = repr([[getattr(body, name, None) for name in _MECHANICAL] for body in scene.bodies])
-    return kept(_MECHANISMS, said, lambda: Mechanism(_body_in_space(body) for body in scene.bodies))
-
-
-Made = TypeVar("Made")
-
-
-def kept(store: dict[Any, Made], key: Any, make: Callable[[], Made]) -> Made:
-    """Return the value of a key in a cache, made if it is absent; the cache keeps the last `_KEPT` used values."""
-    found = store.pop(key, None)
-    store[key] = found = make() if found is None else found
-    for old in [*store][:-_KEPT]:  # of a list, for another thread may change the store meanwhile
-        store.pop(old, None)
-    return found
+    return Mechanism(map(_body_in_space, scene.bodies))
 
 
 def _body_in_space(body: Any) -> Body:
@@ -75,10 +56,7 @@ def _body_in_space(body: Any) -> Body:
 
 def _turn(placed: Any) -> Floats:
     """Return the rotation matrix of a placement: (3, 3) in space, (2, 2) in the plane."""
-    if hasattr(placed, "rpy"):
-        return rotation_of(placed.rpy)
-    sin, cos = sine_cosine(float(placed.angle))
-    return np.array([[cos, -sin], [sin, cos]])
+    return rotation_of(placed.rpy) if hasattr(placed, "rpy") else rotation_of((0.0, 0.0, placed.angle))[:2, :2]
 
 
 def start_of(scene: Scene) -> tuple[Floats, Floats]:
@@ -149,61 +127,43 @@ def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:
     Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies and neighbours across
     one joint are never paired, because they touch by construction.
     """
-    root: list[int] = []  # body -> first body of its tree
+    tree: list[int] = []  # body -> first body of its tree
     part: list[int] = []  # body -> first body of its rigid part
-    carrier: dict[int, int] = {}  # rigid part -> rigid part that carries its joint, -1 = the world
+    carrier: list[int] = []  # body -> rigid part that carries the joint of its own, -1 = the world
     for i, (body, parent) in enumerate(zip(scene.bodies, _parents(scene), strict=True)):
         welded = body.joint == "fixed" and parent >= 0
-        root.append(i if parent < 0 else root[parent])
+        tree.append(tree[parent] if parent >= 0 else i)
         part.append(part[parent] if welded else i)
-        if not welded:
-            carrier[i] = -1 if parent < 0 else part[parent]
-
-    def may_touch(a: int, b: int) -> bool:
-        if a < 0 or b < 0 or root[a] != root[b]:
-            return True
-        adjoining = part[a] == part[b] or carrier[part[a]] == part[b] or carrier[part[b]] == part[a]
-        return scene.contact.self_collisions and not adjoining
-
-    bodies = [body for body, _, _ in _owned_shapes(scene)]
-    found = [(a, b) for a, b in candidate_pairs(shapes) if may_touch(bodies[a], bodies[b])]
-    return np.array(found, np.int32).reshape(-1, 2)
+        carrier.append(carrier[parent] if welded else part[parent] if parent >= 0 else -1)
+    pairs = candidate_pairs(shapes)
+    bodies = np.array([body for body, _, _ in _owned_shapes(scene)], np.int64)[pairs.T]
+    (tree_a, tree_b), (part_a, part_b), (carrier_a, carrier_b) = np.array([tree, part, carrier])[:, bodies]
+    adjoining = (part_a == part_b) | (carrier_a == part_b) | (carrier_b == part_a)
+    apart = (bodies < 0).any(axis=0) | (tree_a != tree_b)
+    return pairs[apart | (scene.contact.self_collisions & ~adjoining)]
 
 
-class Stop(NamedTuple):
-    """One limit of a joint, as a contact between the joint's body and its parent.
+def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
+    """Return the limits of the joints as contacts of a joint's body and its parent, two for each joint with limits.
 
-    The gap is arm · sign · (position − bound) [m]: the distance to the bound of a point on that arm.
+    The gap is arm · sign · (position − bound) [m]: the distance to the bound of a point on that arm; 1 m for a
+    prismatic joint. The arm of a revolute joint is the radius of gyration, about its axis, of all bodies that it
+    carries, in the pose of the start. The effective mass at the stop is then their whole mass, and stiffness and
+    damping act as at a contact.
     """
-
-    body: int
-    parent: int  # −1 = the world
-    sign: float  # 1 for the least position, −1 for the largest
-    bound: float  # [rad, m]
-    arm: float  # [m]; 1 for a prismatic joint
-
-
-def stops_of(scene: Scene, mechanism: Mechanism) -> tuple[Stop, ...]:
-    """Return the limits of the joints as stops, two for each joint with limits.
-
-    The arm of a revolute joint is the radius of gyration, about its axis, of all bodies that it carries, in the pose of
-    the start. The effective mass at the stop is then their whole mass, and stiffness and damping act as at a contact.
-    """
-    if not _stop_count(scene):
-        return ()
-    parents, carried = _parents(scene), [body.mass for body in scene.bodies]
+    parents, carried, arrays = _parents(scene), [body.mass for body in scene.bodies], mechanism.arrays
     for i, parent in reversed(list(enumerate(parents))):
         if parent >= 0:
             carried[parent] += carried[i]
-    inertia, first = np.diagonal(mechanism.mass_matrix(start_of(scene)[0])), mechanism.arrays.v_start
-    found = []
-    for i, body in enumerate(scene.bodies):
-        if body.joint_limits is not None:
-            turned = float(inertia[first[i]]) if body.joint == "revolute" else 0.0
-            arm = math.sqrt(turned / carried[i]) if turned > 0.0 and carried[i] > 0.0 else 1.0
-            low, high = body.joint_limits
-            found += [Stop(i, parents[i], 1.0, low, arm), Stop(i, parents[i], -1.0, high, arm)]
-    return tuple(found)
+    limited = [i for i, body in enumerate(scene.bodies) if body.joint_limits is not None]
+    inertia = np.diagonal(mechanism.mass_matrix(start_of(scene)[0])) if limited else np.zeros(0)
+    turned = [float(inertia[arrays.v_start[i]]) if scene.bodies[i].joint == "revolute" else 0.0 for i in limited]
+    arms = [math.sqrt(x / carried[i]) if x > 0.0 and carried[i] > 0.0 else 1.0
+            for i, x in zip(limited, turned, strict=True)]
+    body, bounds = np.repeat(np.array(limited, np.int64), 2), [scene.bodies[i].joint_limits or () for i in limited]
+    shape = len(_owned_shapes(scene)) + np.arange(len(body), dtype=np.int64)
+    return Stops(body, np.array(parents, np.int64)[body], shape, arrays.q_start[body], arrays.v_start[body],
+                 np.tile([1.0, -1.0], len(limited)), np.array(bounds, np.float64).ravel(), np.repeat(arms, 2))
 
 
 def _stop_count(scene: Scene) -> int:

@@ -37,7 +37,7 @@ class Switches(NamedTuple):
 
 
 class Stops(NamedTuple):
-    """Ends of the joints' ranges, as contacts of a body and its parent (k of them; see `iapb.scene.mechanism.Stop`)."""
+    """Ends of the joints' ranges, as contacts of a body and its parent (k of them; `iapb.scene.mechanism.stops_of`)."""
 
     body: np.ndarray  # (k,) int64
     parent: np.ndarray  # (k,) int64, −1 = the world
