@@ -69,8 +69,7 @@ def test_each_body_has_its_own_friction_at_once() -> None:
     two = on_slope().resolved()
     two["bodies"].append(two["bodies"][0] | {"name": "ice", "position": [-1.0, 0.05, 0.0], "friction": 0.0})
     run = simulate(Scene.model_validate(two | {"contact": two["contact"] | {"friction": 0.5}}))
-    assert run.q[-1, 0] < 1e-3
-    assert run.q[-1, 3] + 1.0 == pytest.approx(FREE_SLIDE, rel=0.01)
+    assert run.q[-1, 0] < 1e-3 and run.q[-1, 3] + 1.0 == pytest.approx(FREE_SLIDE, rel=0.01)
 
 
 @pytest.mark.parametrize("law", [ImpulseAugmented(friction_in_impacts=True), Penalty()])
@@ -121,8 +120,7 @@ def test_functions_are_arithmetic_alone() -> None:
 
 def test_a_force_that_stops_being_a_number_ends_the_run_with_its_reason() -> None:
     run = simulate(pushed(**{"hand.force_function": ["sqrt(0.9 - t)", "0", "0"]}))
-    assert not run.complete
-    assert "sqrt(0.9 - t) has no value at t = 0.901" in run.stopped
+    assert not run.complete and "sqrt(0.9 - t) has no value at t = 0.901" in run.stopped
 
 
 # Joints
@@ -142,8 +140,7 @@ def test_damping_is_backward_euler_for_any_damping(damping: float, integrator: s
     run = simulate(swinging(**{"bodies.rod.joint_damping": damping}), ImpulseAugmented(integrator=integrator))
     expected = 2.0 * (1.0 + 1e-3 * damping / 0.1) ** -np.arange(501.0)
     assert run.v[:, 0] == pytest.approx(expected, rel=1e-9, abs=1e-300)
-    assert (np.diff(run.energy["kinetic"]) <= 0.0).all()
-    assert run.energy["friction_work"][-1] <= 0.0
+    assert (np.diff(run.energy["kinetic"]) <= 0.0).all() and run.energy["friction_work"][-1] <= 0.0
     assert not run.distrust
 
 
@@ -173,10 +170,8 @@ def test_a_joint_rests_at_its_limit_under_load_and_the_springs_hold_it() -> None
     run = simulate(scene)
     arm = math.sqrt(0.1 + 0.09)  # radius of gyration of 1 kg
     sag = 9.81 * 0.3 * math.cos(0.2) / arm / 1e4 / arm
-    assert run.q[-1, 0] == pytest.approx(-0.2 - sag, abs=0.02 * sag)
-    assert abs(run.v[-1, 0]) < 1e-6
-    assert not run.distrust
-    assert not check_scene(scene)
+    assert run.q[-1, 0] == pytest.approx(-0.2 - sag, abs=0.02 * sag) and abs(run.v[-1, 0]) < 1e-6
+    assert not run.distrust and not check_scene(scene)
     assert any("limit of rod" in str(caution) for caution in check_scene(scene.with_values({"contact.stiffness": 1e9})))
 
 
@@ -224,8 +219,7 @@ def test_limits_that_are_not_reached_change_no_bit() -> None:
     names = [body.name for body in scene.bodies if body.joint == "revolute"]
     limited = scene.with_values({f"bodies.{name}.joint_limits": [-50.0, 50.0] for name in names})
     one, other = simulate(scene, steps=300), simulate(limited, steps=300)
-    assert np.array_equal(one.q, other.q)
-    assert np.array_equal(one.v, other.v)
+    assert np.array_equal(one.q, other.q) and np.array_equal(one.v, other.v)
     assert any(effect.name == "joint_limits" and effect.active for effect in other.effects)
 
 
@@ -261,16 +255,12 @@ def test_limits_hold_in_space_for_turning_and_sliding_joints(law: Any) -> None:
     scene = in_space()
     run = simulate(scene, law)
     assert 0.0 < beyond(run, scene) < (0.02 if law.impulses else 0.05)  # springs alone stop late
-    assert not run.distrust
-    assert not run.contacts.friction_force.any()  # a stop has none, whatever contact.friction says
+    assert not run.distrust and not run.contacts.friction_force.any()  # a stop has none, whatever contact.friction says
     assert (np.diff(run.energy["impact_loss"]) >= 0.0).all()
+    alone = simulate(in_space(**{"contact.self_collision_rows": "per_body"}), law)
+    assert np.array_equal(run.q, alone.q)  # rows of one body alone are not used at stops
     free = simulate(scene.with_values({f"bodies.{name}.joint_limits": None for name in ("mast", "boom", "slider")}))
     assert beyond(free, scene) > 0.5
-
-
-def test_rows_of_one_body_alone_are_not_used_at_stops() -> None:
-    together, alone = (simulate(in_space(**{"contact.self_collision_rows": rows})) for rows in ("relative", "per_body"))
-    assert np.array_equal(together.q, alone.q)
 
 
 class Drifting:

@@ -13,16 +13,7 @@ import numpy as np
 import pytest
 
 import iapb.advice.certificate
-from iapb import (
-    ArgumentError,
-    IapbError,
-    Simulation,
-    certify,
-    certify_impacts,
-    find_scene,
-    load_scene,
-    simulate,
-)
+from iapb import ArgumentError, IapbError, Simulation, certify, certify_impacts, find_scene, load_scene, simulate
 from iapb.advice.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
@@ -48,21 +39,15 @@ def fractions_gain(mass: np.ndarray, before: np.ndarray, after: np.ndarray) -> F
 
 
 @pytest.mark.parametrize("decades", [0, 250])
-def test_integers_give_what_rationals_give(decades: int) -> None:
-    mass, v, w = elastic(50, 3)
-    rng = np.random.default_rng(1)
-    scale = 10.0 ** rng.uniform(-decades, decades, (50, 1))
-    for m, before, after in zip(mass, v * scale, w * scale, strict=True):
-        assert exact_gain(m, before, after) == fractions_gain(m, before, after)
+def test_every_impact_is_judged_as_rationals_judge_it(decades: int) -> None:
+    mass, v, w = elastic(200, 3)
+    scale = 10.0 ** np.random.default_rng(1).uniform(-decades, decades, (200, 1))
+    truth = [fractions_gain(*one) for one in zip(mass, v * scale, w * scale, strict=True)]
+    assert [exact_gain(*one) for one in zip(mass, v * scale, w * scale, strict=True)] == truth
+    assert judge_gains(mass, v * scale, w * scale).gained.tolist() == [gain > 0 for gain in truth]
+    assert 25 < sum(gain > 0 for gain in truth) < 175
     assert exact_gain(np.eye(2), [5e-324, 1e308], [1e308, 5e-324]) == 0
     assert exact_gain(np.zeros((2, 2)), [1.0, 2.0], [3.0, 4.0]) == 0
-
-
-def test_every_impact_is_judged_as_rationals_judge_it() -> None:
-    mass, v, w = elastic(400, 3)
-    judged = judge_gains(mass, v, w)
-    truth = [fractions_gain(*one) > 0 for one in zip(mass, v, w, strict=True)]
-    assert judged.gained.tolist() == truth and 50 < sum(truth) < 350
 
 
 def test_planted_gains_of_one_unit_in_the_last_place_are_all_found() -> None:
@@ -88,9 +73,8 @@ def test_gains_below_any_bound_are_left_to_integers() -> None:
     judged = judge_gains(mass, v, np.array([[-1.0, 2.0**-99]]))
     assert judged.gained.tolist() == [True]
     assert judge_gains(mass, v, np.array([[-1.0, 2.0**-101]])).gained.tolist() == [False]
-    cancelling = np.array([[1.0, 1.0], [1.0, 1.0]])
-    before, after = np.array([[1.0, 2.0**-80]]), np.array([[1.0 + 2.0**-52, -(2.0**-52)]])
-    assert judge_gains(cancelling, before, after).gained.tolist() == [exact_gain(cancelling, before[0], after[0]) > 0]
+    cancelling = np.ones((2, 2)), [1.0, 2.0**-80], [1.0 + 2.0**-52, -(2.0**-52)]
+    assert judge_gains(*cancelling).gained.tolist() == [exact_gain(*cancelling) > 0]
 
 
 def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,6 +40,11 @@ def stack(n: int, **values: Any) -> Scene:
 # Regularised friction, sliding and rocking together: tᵀ(J M⁻¹ Jᵀ)t of two corners with N/2 each is (1/m + h²/I) N.
 SLOWEST = 0.5 * 0.5 * 9.81 * 2.5 * 1e-3
 LANDING = scene(box(height=0.1, velocity=[1.0, 0.0, 0.0]), duration=0.4, stiffness=1e4, friction=0.5, restitution=0.5)
+BALL = SpatialScene.model_validate({
+    "name": "made", "dimensions": 3, "rate": 1000, "duration": 0.2, "integrator": "midpoint", "bodies": [
+        {"name": "ball", "joint": "free_flyer", "mass": 0.5, "inertia": [1e-3] * 3, "position": [0, 0, 1, 0, 0, 0, 1],
+         "shapes": [{"kind": "sphere", "radius": 0.05}]}],
+    "walls": [{"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}]})
 DOOR = {"name": "door", "joint": "prismatic", "axis": [0, 1], "mass": 1, "joint_limits": [-0.1, 0.1]}
 
 # scene, kinds of warnings in their order, what the last one says, values each of which silences them
@@ -65,6 +70,8 @@ WARNED: dict[str, tuple[Scene, list[str], list[str], list[dict[str, Any]]]] = {
                     ["overlap"], ["no joint can move it out"], [{"walls": []}]),
     "fast": (scene(box(height=0.5, velocity=[0, -100.0, 0]), walls=[PLATE], stiffness=1e4), ["fast"],
              ["100 m/s", "rate >= 8100 Hz"], [{"bodies.box_0.velocity": [0, -10.0, 0]}, {"rate": 8100.0}]),
+    "implicit in space": (BALL, ["integrator"], ["gain energy with the integrator midpoint"],
+                          [{"integrator": "momentum"}, {"contact.forces": "paper"}, {"walls": []}]),
     "slides as it lands": (
         LANDING, ["impact friction"], ["1.4 m/s", "slide at 1 m/s"],
         [{"contact.friction": 0.0}, {"bodies.box_0.velocity": [0.0, 0.0, 0.0]}, {"bodies.box_0.friction": 0.0},

@@ -147,15 +147,12 @@ def test_an_effect_that_is_off_would_change_no_bit(name: str) -> None:
         off.step()
         on.step()
     assert off.state.contact_count[0] > 0
-    assert (off.state.q == on.state.q).all()
-    assert (off.state.v == on.state.v).all()
+    assert (off.state.q == on.state.q).all() and (off.state.v == on.state.v).all()
 
 
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_gets_a_reason_for_every_effect(name: str) -> None:
-    for found in decide_effects(load_scene(find_scene(name))):
-        assert found.reason
-        assert "None" not in found.reason
+    assert all(found.reason and "None" not in found.reason for found in decide_effects(load_scene(find_scene(name))))
 
 
 @given(st.sampled_from([("penalty_stiffness", "stiffness"), ("contact_damping", "damping"), ("friction", "friction"),

@@ -21,23 +21,16 @@ def contacts_at(scene: Scene, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarra
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_loads_under_its_file_name_and_starts_without_deep_overlap(name: str) -> None:
     scene = load_scene(find_scene(name))
-    assert scene.name == name
-    assert scene.title
-    assert scene.source
+    assert scene.name == name and scene.title and scene.source
     q, _ = start_of(scene)
     assert all(gap > -1e-3 for _, _, gap in contacts_at(scene, q))
     assert np.linalg.eigvalsh(mechanism_of(scene).mass_matrix(q)).min() > 0.0
 
 
-@pytest.mark.parametrize(
-    ("name", "height", "along"), [("two_link_arm_a", 1.7, 0.7), ("two_link_arm_b", 1.5, 0.5)]
-)
-def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(
-    name: str, height: float, along: float
-) -> None:
+@pytest.mark.parametrize(("name", "height", "along"), [("two_link_arm_a", 1.7, 0.7), ("two_link_arm_b", 1.5, 0.5)])
+def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(name: str, height: float, along: float) -> None:
     scene = load_scene(find_scene(name))
-    q, v = start_of(scene)
-    mechanism = mechanism_of(scene)
+    mechanism, (q, v) = mechanism_of(scene), start_of(scene)
     ((point, normal, gap),) = contacts_at(scene, q)
     assert gap == pytest.approx(-1e-9, abs=1e-13)
     np.testing.assert_allclose(normal, [1.0, 0.0, 0.0], atol=1e-12)
@@ -47,10 +40,8 @@ def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(
 
 
 def test_point_mass_reading_of_the_arm_starts_with_5_joules() -> None:
-    links = ("upper_arm", "forearm")
-    points = {f"bodies.{link}.center_of_mass": [1, 0] for link in links} | {
-        f"bodies.{link}.inertia": 0 for link in links
-    }
+    points = {f"bodies.{link}.{field}": value for link in ("upper_arm", "forearm")
+              for field, value in (("center_of_mass", [1, 0]), ("inertia", 0))}
     scene = load_scene(find_scene("two_link_arm_a")).with_values(points)
     assert mechanism_of(scene).kinetic_energy(*start_of(scene)) == pytest.approx(5.0, rel=1e-14)
 
@@ -64,9 +55,7 @@ def test_peg_has_the_numbers_of_the_paper_and_is_pushed_into_the_corner(name: st
     assert scene.hand is not None and scene.device is not None
     assert scene.device.force_limit == (15.0, 15.0, 1.0)
     normals = np.array([wall.normal for wall in scene.walls if wall.name in ("right_wall", "floor")])  # type: ignore[union-attr]
-    assert (
-        normals @ np.array(scene.hand.force[:2]) < 0.0
-    ).all()  # the push goes into both walls of the corner
+    assert (normals @ np.array(scene.hand.force[:2]) < 0.0).all()  # into both walls of the corner
 
 
 def test_table_1_stands_in_the_peg_scenes() -> None:
@@ -100,8 +89,7 @@ def peg() -> Run:
 
 
 def test_dozens_of_collisions_at_once_are_resolved_without_gain(peg: Run) -> None:
-    assert peg.complete
-    assert peg.impacts.rows.max() >= 24
+    assert peg.complete and peg.impacts.rows.max() >= 24
     assert (peg.impacts.rank <= np.minimum(peg.impacts.rows, peg.v.shape[1])).all()
     assert (peg.impacts.rank < peg.impacts.rows).any()  # redundant rows among them
     assert peg.impacts.energy_lost.min() > -1e-15
@@ -121,9 +109,7 @@ def test_links_of_the_arm_meet_obstacles_and_the_block() -> None:
     arm = {name for name in run.body_names if name.startswith("arm_")}
     assert any("world" in pair and pair & arm for pair in met)
     assert any("block" in pair and pair & arm for pair in met)
-    assert len(run.impacts.step) > 0
-    assert run.impacts.energy_lost.min() > -1e-12
-    assert np.isfinite(run.q).all()
+    assert len(run.impacts.step) > 0 and run.impacts.energy_lost.min() > -1e-12 and np.isfinite(run.q).all()
 
 
 def test_a_scene_in_space_and_its_planar_twin_move_alike() -> None:
