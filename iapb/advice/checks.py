@@ -27,7 +27,7 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
-from iapb.scene.parts import LARGEST_NUMBER
+from iapb.scene.parts import LARGEST_NUMBER, written
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]  # numbers of contacts
@@ -318,9 +318,8 @@ def _degrees(scene: Scene) -> Iterator[Caution]:
             angles += [(("bodies", i, field, k), x, MANY_TURNS) for k, x in enumerate(getattr(body, field) or ())]
     for path, angle, unit in angles:
         if abs(angle) > math.tau and angle % unit == 0.0:
-            name = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path)[1:]
-            yield Caution("degrees", name, f"{scene.place_of(*path)}{name} = {angle:g} rad looks like degrees: set "
-                          f"{math.radians(angle):.6g}, for angles are in radians")
+            yield Caution("degrees", written(path), f"{scene.place_of(*path)}{written(path)} = {angle:g} rad looks "
+                          f"like degrees: set {math.radians(angle):.6g}, for angles are in radians")
 
 
 def _overlaps(start: Start) -> Iterator[Caution]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
@@ -23,7 +24,6 @@ from pydantic import (
 )
 
 from iapb.mechanics.joints import KINDS
-from iapb.scene.density import filled
 from iapb.scene.parts import (
     SMALLEST_POSITIVE,
     Name,
@@ -86,8 +86,7 @@ class Polygon(Part):
 
     kind: Literal["polygon"] = Field(description="a convex polygon")
     vertices: Annotated[tuple[Vector2, ...], Field(min_length=3, max_length=MAX_VERTICES)] = Field(
-        description="corners in order [m], around the shape in either direction, relative to center"
-    )
+        description="corners in order [m], around the shape in either direction, relative to center")
     center: Vector2 = Field((0.0, 0.0), description="where its origin lies [m], in body axes (walls: world axes)")
     angle: Number = Field(0.0, description="its rotation about its origin [rad], counter-clockwise")
 
@@ -177,11 +176,9 @@ CenterOfMass = Annotated[V, Field(description="centre of mass [m], body axes")]
 Shapes = Annotated[tuple[V, ...], Field(max_length=MAX_SHAPES_OF_BODY,
                                         description="what can touch; none: the body passes through everything")]
 JointDamping = Annotated[
-    tuple[NonNegative, ...],
-    BeforeValidator(lambda given: (given,) if isinstance(given, int | float) else given,
-                    json_schema_input_type=NonNegative | tuple[NonNegative, ...]),
-    Field(description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none"),
-]
+    tuple[NonNegative, ...], BeforeValidator(lambda given: (given,) if isinstance(given, int | float) else given,
+                                             json_schema_input_type=NonNegative | tuple[NonNegative, ...]),
+    Field(description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none")]
 Inertia = Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tuple[Vector3, Vector3, Vector3]
 
 
@@ -218,7 +215,7 @@ class AnyBody(Part):
             return given
         kinds: dict[str, Any] = {"shapes": cls.model_fields["shapes"].annotation, "density": Positive}
         try:
-            inertial = filled(*(TypeAdapter(kind).validate_python(given[name]) for name, kind in kinds.items()))
+            inertial = _filled_with(*(TypeAdapter(kind).validate_python(given[name]) for name, kind in kinds.items()))
         except (LookupError, ValidationError, ArithmeticError):  # no or wrong shapes, or a mass that rounds to zero
             return given
         return {name: value for name, value in given.items() if name not in ("density", *INERTIAL)} | inertial
@@ -328,3 +325,49 @@ def inertia_matrix(inertia: Any) -> NDArray[np.float64]:
         return np.array(inertia, np.float64)
     xx, yy, zz, xy, xz, yz = (*inertia, 0.0, 0.0, 0.0)[:6]
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], np.float64)
+
+
+@np.errstate(divide="raise", invalid="raise")
+def _filled_with(shapes: Sequence[Any], density: float) -> dict[str, Any]:
+    """Return `mass`, `center_of_mass` and `inertia` of shapes of one density, without BLAS; overlaps count twice."""
+    parts = [_mass_of(shape, density) for shape in shapes]
+    mass = math.fsum(m for m, _, _ in parts)
+    center = sum(m * c for m, c, _ in parts) / mass
+    inertia: Any = 0.0
+    for m, c, about in parts:
+        r = c - center
+        square = (r * r).sum()
+        inertia = inertia + about + m * (square if len(r) == 2 else square * np.eye(3) - np.outer(r, r))
+    return {"mass": mass, "center_of_mass": center.tolist(), "inertia": np.asarray(inertia).tolist()}
+
+
+def _mass_of(shape: Any, density: float) -> tuple[float, Any, Any]:
+    """Return mass, centre of mass in body axes, and inertia about it: a number in the plane, a matrix in space."""
+    center = np.array(shape.center)
+    if shape.kind == "circle":
+        mass = density * math.pi * shape.radius**2
+        return mass, center, 0.5 * mass * shape.radius**2
+    if shape.kind == "sphere":
+        mass = density * 4.0 / 3.0 * math.pi * shape.radius**3
+        return mass, center, np.eye(3) * (0.4 * mass * shape.radius**2)
+    from iapb.mechanics.rotations import rotation_of  # brings numba along
+
+    if shape.kind == "polygon":
+        mass, own, about = _polygon(np.array(shape.vertices), density)
+        turn = rotation_of((0.0, 0.0, shape.angle))[:2, :2]
+        return mass, center + (turn * own).sum(axis=1), about
+    mass, squares = density * math.prod(shape.size), np.array(shape.size) ** 2
+    if len(center) == 2:
+        return mass, center, mass * squares.sum() / 12.0
+    turn, principal = rotation_of(shape.rpy), mass * (squares.sum() - squares) / 12.0
+    return mass, center, sum(principal[k] * np.outer(turn[:, k], turn[:, k]) for k in range(3))
+
+
+def _polygon(vertices: Any, density: float) -> tuple[float, Any, float]:
+    """Return mass, centre and moment of inertia from the triangles between the first corner and each edge."""
+    a, b = vertices[1:-1] - vertices[0], vertices[2:] - vertices[0]
+    masses = 0.5 * density * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    mass = masses.sum()
+    center = (masses[:, None] * (a + b)).sum(axis=0) / (3.0 * mass)
+    about = (masses * (a * a + a * b + b * b).sum(axis=1)).sum() / 6.0 - mass * (center * center).sum()
+    return float(mass), center + vertices[0], about

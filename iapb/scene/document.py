@@ -145,11 +145,9 @@ def _flow(value: Any) -> str:
         return f"[{', '.join(map(_flow, value))}]"
     if isinstance(value, dict):
         return f"{{{', '.join(f'{name}: {_flow(item)}' for name, item in value.items())}}}"
-    if isinstance(value, str):
-        return value if _PLAIN.fullmatch(value) and value.lower() not in _OTHERWISE else _quoted(value)
-    return repr(value) if isinstance(value, float) else json.dumps(value)
-
-
-def _quoted(text: str) -> str:
-    """Return a text in double quotes, with codes for quotes, backslashes and characters that cannot be printed."""
-    return '"' + "".join(f"\\U{ord(c):08x}" if c in '"\\' or not c.isprintable() else c for c in text) + '"'
+    if not isinstance(value, str):
+        return repr(value) if isinstance(value, float) else json.dumps(value)
+    if _PLAIN.fullmatch(value) and value.lower() not in _OTHERWISE:
+        return value
+    coded = (f"\\U{ord(c):08x}" if c in '"\\' or not c.isprintable() else c for c in value)
+    return f'"{"".join(coded)}"'

@@ -78,8 +78,7 @@ class Contact(Part):
         "(5) to the letter, may pull")
     friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")
     friction_pairs: Annotated[tuple[FrictionPair, ...], Field(max_length=MAX_PAIRS)] = Field(
-        (), description="coefficients of single pairs; they come before what bodies and walls give; default: none"
-    )
+        (), description="coefficients of single pairs; they come before what bodies and walls give; default: none")
     friction_law: Literal["coulomb", "regularised"] = Field("coulomb", description="coulomb (default): sticks and "
         "slides, implicit in the step; regularised: the paper's explicit (6)")
     friction_velocity: Positive = Field(1e-3, description="v_threshold of (6) [m/s]: below it regularised friction "
@@ -233,8 +232,7 @@ class Scene(Part):
     duration: Positive = Field(description="simulated time [s]")
     integrator: Literal["momentum", "semi_implicit_euler", "midpoint", "runge_kutta_4"] | None = Field(
         None, description="how a step moves the bodies; default momentum, which keeps linear and angular momentum; in "
-        "the plane with contact.forces: paper semi_implicit_euler"
-    )
+        "the plane with contact.forces: paper semi_implicit_euler")
     gravity: Gravity[Vector2] = None
     bodies: Bodies[Body]
     walls: Walls[Wall] = ()
@@ -469,14 +467,9 @@ def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
         place = place[key]
     for replaced in INERTIAL if last == "density" and isinstance(place, dict) else ():
         place.pop(replaced, None)
-    place[_key(place, last, path)] = _plain(value)
-
-
-def _plain(value: Any) -> Any:
-    """Return a copy of a value, with numpy arrays and numbers as plain lists and numbers."""
     if isinstance(value, Set | Iterator):  # has no order, or can be read once only
         raise ArgumentError("values", value, "numbers, texts, lists or mappings")
-    return value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
+    place[_key(place, last, path)] = value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
 
 
 def _key(place: Any, step: str, path: str) -> str | int:
