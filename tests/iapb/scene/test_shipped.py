@@ -52,8 +52,7 @@ def test_peg_has_the_numbers_of_the_paper_and_is_pushed_into_the_corner(name: st
     peg = scene.bodies[0]
     assert (scene.rate, peg.mass, peg.inertia, peg.shapes[0].size) == (512.0, 2.0, 0.005, (0.021, 0.0105))  # type: ignore[union-attr]
     assert (scene.contact.stiffness, scene.contact.damping, scene.contact.restitution) == (1000.0, 50.0, 0.0)
-    assert scene.hand is not None and scene.device is not None
-    assert scene.device.force_limit == (15.0, 15.0, 1.0)
+    assert scene.hand is not None and scene.device is not None and scene.device.force_limit == (15.0, 15.0, 1.0)
     normals = np.array([wall.normal for wall in scene.walls if wall.name in ("right_wall", "floor")])  # type: ignore[union-attr]
     assert (normals @ np.array(scene.hand.force[:2]) < 0.0).all()  # into both walls of the corner
 
@@ -61,11 +60,9 @@ def test_peg_has_the_numbers_of_the_paper_and_is_pushed_into_the_corner(name: st
 def test_table_1_stands_in_the_peg_scenes() -> None:
     for name in ("peg_corner", "peg_hole", "peg_room"):
         couplings = load_scene(find_scene(name)).couplings
-        assert couplings.four_channel is not None and couplings.unilateral is not None
-        assert couplings.four_channel.stiffness == (100.0, 100.0, 0.5)
-        assert couplings.four_channel.damping == (70.0, 70.0, 0.375)
-        assert couplings.unilateral.stiffness == (1000.0, 1000.0, 2.5)
-        assert couplings.unilateral.damping == (50.0, 50.0, 0.125)
+        assert couplings.model_dump() == {
+            "four_channel": {"stiffness": (100.0, 100.0, 0.5), "damping": (70.0, 70.0, 0.375)},
+            "unilateral": {"stiffness": (1000.0, 1000.0, 2.5), "damping": (50.0, 50.0, 0.125)}}
 
 
 @pytest.mark.parametrize("depth", [1e-6, 1e-5, 7e-5])
@@ -78,8 +75,7 @@ def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float
     q, inward = seated - [0.0, depth, 0.0], np.array([0.0, -0.04, 0.0])
     found = contacts_at(scene, q)
     rows = np.array([normal @ mechanism.point_jacobian(q, 0, point) for point, normal, _ in found])
-    assert rows.shape == (6, 3)
-    assert (rows @ inward < -10.0 * scene.contact.approach_velocity).all()
+    assert rows.shape == (6, 3) and (rows @ inward < -10.0 * scene.contact.approach_velocity).all()
     assert np.linalg.matrix_rank(rows, tol=1e-4) == 3
 
 
