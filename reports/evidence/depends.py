@@ -26,7 +26,6 @@ PACKAGES: dict[str, tuple[str, ...]] = {
     "complementarity": ("cvxpy", "clarabel", "osqp", "scs", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon",
                         "pin", "siconos"),
     "haptic-rate": ("mujoco", "pybullet", "drake", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),
-    "cross-checks": ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon"),
 }
 
 

@@ -34,7 +34,7 @@ Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress
 # study that draws random numbers -> module with its SEED
 SEEDS = {
     "claims": "verification.check", "properties": "verification.laws.study",
-    "proofs": "verification.proofs.statements.exact_instances", "robots": "verification.mechanics.robots",
+    "proofs": "verification.proofs.statements.exact_instances", "robots": "verification.mechanics.against_pinocchio",
     "power balance": "verification.mechanics.power_balance",
     "coordinates": "verification.mechanics.coordinate_invariance",
 }  # fmt: skip

@@ -12,7 +12,6 @@ from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_o
 TOPICS: dict[str, str] = {
     "energy-gains": "verification.laws.study:energy_gains",
     "properties": "verification.laws.study:properties",
-    "cross-checks": "verification.mechanics.cross_checks:cross_checks",
     "mechanics": "verification.mechanics.mechanics:mechanics",
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
     "stability": "verification.stability.contact_stability:contact_stability",

@@ -55,7 +55,6 @@ SECTIONS: tuple[Section, ...] = (
     Section(ENERGY, "properties", "Properties", _has("properties"),
             tables=("properties", "counterexamples", "energy-gains")),
     _topic(ENERGY, "exact-energy", "Exact energy"),
-    _topic(CHECKS, "cross-checks", "Cross-checks"),
     _topic(CHECKS, "mechanics", "Linkages and free bodies"),
     _topic(CHECKS, "scene-ledger", "The scenes"),
     _topic(CHECKS, "complementarity", "Against complementarity"),

@@ -20,13 +20,12 @@ from reports.runner import Runner
 from verification import proofs
 from verification.claims import arm
 from verification.cost import effects, impacts
-from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Column, Failure, Table, failure_of
+from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
 from verification.hard_cases import study as hard_cases
 from verification.laws import engine_laws, impact_laws, trajectory_laws
 from verification.laws import study as laws
 from verification.laws.contracts import CONTRACTS
-from verification.mechanics import cross_checks
 
 Patch = pytest.MonkeyPatch
 Found = tuple[Any, list[Failure]]
@@ -112,17 +111,6 @@ def of_bulk(patch: Patch, folder: Path) -> list[str]:
     return [failure.case for failure in found.failures]
 
 
-def of_cross_checks(patch: Patch, folder: Path) -> list[str]:
-    patch.setattr(cross_checks, "_STATES", 2)
-    patch.setattr(cross_checks, "find_scene", broken(cross_checks.find_scene, "peg_corner".__eq__))
-    patch.setattr(cross_checks, "_impulse_dynamics", lambda name: iter(()))
-    patch.setattr(cross_checks, "_complementarity", broken(lambda name: iter([made_up(name)]), "daqp".__eq__))
-    found = cross_checks.cross_checks(Runner(folder), "quick", nothing)
-    assert found.tables["comparisons"].column("quantity")[2:] == ["cvxpy_clarabel", "lemke"]
-    assert [part.verdict for part in found.parts] == [REPRODUCED] * 3 + [REFUTED, NOT_COMPUTED]
-    return [failure.case for failure in found.failures]
-
-
 def made_up(solver: str) -> dict[str, Any]:
     """A comparison that fails by Lemke's method."""
     difference = 1.0 if solver == "lemke" else 0.0
@@ -186,32 +174,16 @@ def of_survival(patch: Patch, folder: Path) -> list[str]:
     return [failure.case for failure in topic.failures]
 
 
-def rolled_ball(scene: Any, simulate: Any) -> Any:
-    """A ball that no false collision stops."""
-    from verification.mechanics.false_collisions import FalseCollisions
-
-    contact = scene.contact
-    filters = contact.cluster_distance > 0.0, contact.coherence_distance > 0.0
-    return FalseCollisions(*filters, contact.damping, 1, 0, 0, 0, 0, 0.0, 0.1, 1.0, (), ())
-
-
 def of_mechanics(patch: Patch, folder: Path) -> list[str]:
-    from verification.mechanics import false_collisions, linked_impacts, mechanics, robots, tumbling
+    from dataclasses import replace
 
-    patch.setattr(robots, "STATES", 1)
-    patch.setattr(robots, "TREE_SIZES", (1, 2))
-    patch.setattr(robots, "_trees", broken(robots._trees, lambda joints, *_: joints == 2))
-    patch.setattr(mechanics, "AGAINST_PINOCCHIO", {"random trees": robots.compare_trees})
-    wrong = broken(tumbling.tumbling, lambda *_: True)
-    patch.setattr(mechanics, "STUDIES", {"tumbling": (wrong, tumbling.convergence)})
-    kept, names = ("cradle of 5", "cradle of 2"), ("cradle of 2",)
-    outcomes = broken(linked_impacts.outcomes, lambda balls: balls.name in names)
-    patch.setattr(linked_impacts, "outcomes", lambda balls: outcomes(balls) if balls.name in kept else ())
-    ball = broken(rolled_ball, lambda scene, _: scene.contact.damping == 10.0 and scene.contact.cluster_distance > 0.0)
-    patch.setattr(false_collisions, "count_false", ball)
-    topic = mechanics.mechanics(Runner(folder), "quick", nothing)
-    assert [row[2] for row in topic.tables["against Pinocchio"].rows] == ["random"]
-    assert {row[0] for row in topic.tables["linked impacts"].rows} == {"cradle of 5"}
+    from verification.mechanics import linked_impacts
+    from verification.mechanics.mechanics import mechanics
+
+    outcomes = linked_impacts.outcomes
+    patch.setattr(linked_impacts, "outcomes", broken(outcomes, lambda balls: balls.name == "cradle of 2"))
+    topic = replace(mechanics, checks=(linked_impacts.LINKED_IMPACTS,))(Runner(folder), "quick", nothing)
+    assert "cradle of 5" in topic.tables["linked impacts"].column("problem")
     return [failure.case for failure in topic.failures]
 
 
@@ -221,14 +193,12 @@ STAGES: dict[Callable[[Patch, Path], list[str]], list[str]] = {
     of_properties: ["a law of each kind"],
     of_counterexamples: ["saturation"],
     of_bulk: ["factored, no clamp"],
-    of_cross_checks: ["peg_corner", "daqp"],
     of_hard_cases: ["grazing, svd", "lost"],
     of_accuracy: [", IAPB, 1 row"],
     of_effects: ["peg_corner, impulses", "arm_pushing"],
     of_runs: ["hole/IAPB"],
     of_survival: ["corner/PB"],
-    of_mechanics: ["random trees, trees of 2", "tumbling", "cradle of 2", "clustering alone, 10 N s/m",
-                   "both filters, 10 N s/m"],
+    of_mechanics: ["linked impacts, cradle of 2", "the answer"],
 }
 
 

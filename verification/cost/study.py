@@ -63,8 +63,8 @@ from verification.finding import (
     of_each,
     table_of,
 )
+from verification.mechanics.against_pinocchio import SHIPPED, robot_files
 from verification.mechanics.robot_timing import LARGEST_RATIO, MANY, ONE, time_robots
-from verification.mechanics.robots import SHIPPED, robot_files
 
 KEY, TITLE = "haptic-rate", "The haptic rate"
 QUESTION = (

@@ -17,18 +17,9 @@ from numpy.typing import NDArray
 from iapb import resolve_impact
 from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
-from verification.finding import (
-    Column,
-    Failure,
-    Part,
-    Row,
-    Table,
-    check_depth,
-    of_each,
-    table_of,
-    verdict_of_law,
-)
+from verification.check import Check, Study
 from verification.mechanics.planar_arm import Contact, PlanarArm
+from verification.table import Row, Table
 
 Floats = NDArray[np.float64]
 
@@ -59,18 +50,6 @@ CONTACTS = {
 CLOSE = {f"two, {gap:g} m apart": (Contact(1, 0.7, ACROSS), Contact(1, 0.7 + gap, ACROSS))
          for gap in (1e-2, 1e-4, 1e-6, 1e-8)}  # fmt: skip
 
-COLUMNS = (
-    Column("coordinates", part=True),
-    Column("contacts", condition=True),
-    Column("elbow", "rad", condition=True),
-    Column("κ(M)"),
-    Column("κ(∂f/∂r)²"),
-    Column("σ_min"),
-    Column("error"),
-    Column("bound"),
-    Column("tolerance"),
-    Column("refused"),
-)
 ABSOLUTE, HAND = "absolute angles", "place of the hand"
 
 
@@ -83,34 +62,18 @@ class Impact(NamedTuple):
     restitution: float
 
 
-def coordinate_invariance(
-    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
-) -> Table:
-    """Resolve impacts in two sets of coordinates, from a bent elbow to 1e-12 rad before the singular pose."""
-    check_depth(depth)
-    statement = "An impact has one outcome, whatever the coordinates it is solved in."
-    tolerance = (
-        f"{AGREEMENT:g} of the velocity in the kinetic metric where κ(M) and κ(∂f/∂r)² are at most {MODERATE:g} "
-        f"and rows are redundant exactly or separated (σ_min ≥ {SEPARATED:g}); "
-        f"elsewhere {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min, "
-        "which says nothing once it exceeds 1"
-    )
-    rows = _rows(POSES[depth], seed, failures)
-    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}."))
+def _cases(_: Study) -> Iterator[tuple[str, str, float]]:
+    for case in product((ABSOLUTE, HAND), {**CONTACTS, **CLOSE}, ELBOWS):
+        if case[::2] != (HAND, ELBOWS[-1]):
+            yield case
 
 
-def _rows(poses: int, seed: int, failures: list[Failure] | None) -> Iterator[dict[str, Any]]:
-    mechanism, contacts = ARM.mechanism(), {**CONTACTS, **CLOSE}
-
-    def rows_of(case: tuple[str, str, float]) -> Iterator[dict[str, Any]]:
-        coordinates, label, elbow = case
-        rng = np.random.default_rng([seed, ELBOWS.index(elbow)])
-        impacts = _impacts(rng, elbow, contacts[label], poses)
-        found = [compare(mechanism, impact, coordinates) for impact in impacts]
-        yield {"coordinates": coordinates, "contacts": label, "elbow": elbow, **_worst(found)}
-
-    cases = (case for case in product((ABSOLUTE, HAND), contacts, ELBOWS) if case[::2] != (HAND, ELBOWS[-1]))
-    return of_each(cases, rows_of, failures)
+def _row(study: Study, case: tuple[str, str, float]) -> dict[str, Any]:
+    coordinates, label, elbow = case
+    rng, mechanism = np.random.default_rng([SEED, ELBOWS.index(elbow)]), ARM.mechanism()
+    impacts = _impacts(rng, elbow, {**CONTACTS, **CLOSE}[label], POSES[study.depth])
+    found = [compare(mechanism, impact, coordinates) for impact in impacts]
+    return {"coordinates": coordinates, "contacts": label, "elbow [rad]": elbow, **_worst(found)}
 
 
 def _impacts(
@@ -159,12 +122,15 @@ def _separation(mass: Floats, rows: Floats, rank: int) -> float:
     return float(values[rank - 1])
 
 
+_NAMES = ("κ(M)", "κ(∂f/∂r)²", "σ_min", "error", "bound", "tolerance")
+
+
 def _worst(found: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the impact with the largest error / tolerance, and the number of refused impacts."""
     rows = [row | {"tolerance": tolerance_of(row)} for row in found]
     solved = [row for row in rows if row["error"] is not None]
     worst = max(solved or rows, key=lambda row: (row["error"] or 0.0) / row["tolerance"])
-    return worst | {"refused": sum(row["refused"] for row in rows)}
+    return {name: worst[name] for name in _NAMES} | {"refused": sum(row["refused"] for row in rows)}
 
 
 def tolerance_of(row: Row) -> float:
@@ -173,20 +139,28 @@ def tolerance_of(row: Row) -> float:
     return AGREEMENT if moderate else float(row["bound"])
 
 
-def judged(table: Table) -> Table:
-    """Judge each row: a tolerance of 1 or more gives no outcome; otherwise a refused impact is a failure."""
-    return table.judged(lambda row: None if row["tolerance"] >= 1.0 else
-                        row["refused"] == 0 and row["error"] <= row["tolerance"])  # fmt: skip
+def holds(row: Row) -> bool | None:
+    """Judge a row: a tolerance of 1 or more gives no outcome; otherwise a refused impact is a failure."""
+    return None if row["tolerance"] >= 1.0 else row["refused"] == 0 and row["error"] <= row["tolerance"]
 
 
-def invariance(table: Table) -> Part:
-    """Return the part on C06: the error for moderate condition numbers, and for the other cases."""
+def invariance(table: Table) -> str:
+    """Return the error for moderate condition numbers, and for the other cases, in words."""
     rows = [(row, held) for row, held in zip(table.records(), table.holds, strict=True)]
     moderate = [row["error"] for row, _ in rows if row["tolerance"] == AGREEMENT]
     beyond = [row["error"] / row["bound"] for row, held in rows if held is not None and row["tolerance"] != AGREEMENT]
-    return Part(
+    return (
         f"C06: the same impact, solved in two sets of coordinates, agrees to {max(moderate):.1e} in {len(moderate)} "
         f"cases of moderate condition number (tolerance {AGREEMENT:g}). In {len(beyond)} worse conditioned cases, up "
         f"to the singular pose, the error is at most {max(beyond):.1e} of the rounding bound C ε κ/σ_min. In "
-        f"{sum(held is None for _, held in rows)} cases this bound exceeds 1, so they cannot be judged.",
-        verdict_of_law(table.holds))  # fmt: skip
+        f"{sum(held is None for _, held in rows)} cases this bound exceeds 1, so they cannot be judged.")  # fmt: skip
+
+
+COORDINATES = Check(
+    key="coordinate invariance", question="An impact has one outcome, whatever the coordinates it is solved in.",
+    cases=_cases, row=_row, holds=holds, says=invariance, parts=("coordinates",),
+    note="An impact has one outcome, whatever the coordinates it is solved in. Tolerance: "
+         f"{AGREEMENT:g} of the velocity in the kinetic metric where κ(M) and κ(∂f/∂r)² are at most {MODERATE:g} and "
+         f"rows are redundant exactly or separated (σ_min ≥ {SEPARATED:g}); elsewhere {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² "
+         "/ σ_min, which says nothing once it exceeds 1.",
+)  # fmt: skip

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 
 from iapb import resolve_impact
 from reference.event_driven import LinearSystem, event_driven
-from verification.finding import REFUTED, REPRODUCED, Failure, Part, Table, of_each, titled
+from verification.check import Check, Study
+from verification.finding import REFUTED, REPRODUCED, Part
+from verification.table import Row, Table
 
 Floats = NDArray[np.float64]
 
@@ -46,6 +48,9 @@ class LinkedBalls:
     normals: Floats
     velocity: Floats
 
+    def __str__(self) -> str:
+        return self.name
+
     def relative_rows(self, chosen: Sequence[int]) -> Floats:
         """Rows (12), nᵀ(J_a − J_b), of the chosen contacts."""
         rows = np.zeros((len(chosen), *self.velocity.shape))
@@ -68,31 +73,6 @@ class LinkedBalls:
         return tuple(np.flatnonzero(self.relative_rows(every) @ self.velocity.ravel() < 0.0).tolist())
 
 
-@dataclass(frozen=True)
-class LinkedOutcome:
-    """Outcome of one treatment of one problem.
-
-    rows : the rows or the order, in words; before, velocity : (n, 2) before and after the impact [m/s]
-    """
-
-    problem: str
-    treatment: str
-    rows: str
-    before: Floats
-    velocity: Floats
-
-    @property
-    def energy_change(self) -> float:
-        """Relative change of the kinetic energy."""
-        return float(np.sum(self.velocity**2) / np.sum(self.before**2) - 1.0)
-
-    @property
-    def momentum_change(self) -> float:
-        """Magnitude of the change of momentum, relative to the momentum before."""
-        before = self.before.sum(axis=0)
-        return float(np.linalg.norm(self.velocity.sum(axis=0) - before) / np.linalg.norm(before))
-
-
 def cradle(balls: int = 5) -> LinkedBalls:
     """Newton's cradle: ball 0 arrives along +x."""
     velocity = np.zeros((balls, 2))
@@ -110,92 +90,83 @@ def bernoulli(degrees: float = 30.0) -> LinkedBalls:
     return LinkedBalls("Bernoulli", ((0, 1), (0, 2), (1, 2)), normals, velocity)
 
 
-def outcomes(balls: LinkedBalls) -> tuple[LinkedOutcome, ...]:
-    """Return the elastic outcomes of every treatment."""
+def outcomes(balls: LinkedBalls) -> Iterator[tuple[str, str, Floats]]:
+    """Yield treatment, rows or order in words, and velocity (n, 2) after the elastic impact [m/s]."""
     chosen = {ALL: tuple(range(len(balls.contacts))), APPROACHING: balls.approaching()}
-    rows_of = {RELATIVE: balls.relative_rows, PER_BODY: balls.per_body_rows}
-    found = [_mapped(balls, treatment, words, rows(contacts))
-             for treatment, rows in rows_of.items() for words, contacts in chosen.items()]  # fmt: skip
-    return (*found, *_sequential(balls))
-
-
-def _mapped(balls: LinkedBalls, treatment: str, rows_in_words: str, rows: Floats) -> LinkedOutcome:
     v = balls.velocity.ravel()
-    after = resolve_impact(np.eye(len(v)), rows, v, 1.0).velocity
-    return LinkedOutcome(balls.name, treatment, rows_in_words, balls.velocity, after.reshape(-1, 2))
+    for treatment, rows in ((RELATIVE, balls.relative_rows), (PER_BODY, balls.per_body_rows)):
+        for words, contacts in chosen.items():
+            after = resolve_impact(np.eye(len(v)), rows(contacts), v, 1.0).velocity
+            yield treatment, words, after.reshape(-1, 2)
+    for order, start in _orders(balls):
+        system = LinearSystem(np.eye(len(v)), np.zeros(len(v)), balls.relative_rows(chosen[ALL]), start, 1.0)
+        path = event_driven(system, np.zeros(len(v)), v, duration=10.0)
+        yield SEQUENTIAL, order, path.v[-1].reshape(-1, 2)
 
 
-def _sequential(balls: LinkedBalls) -> Iterator[LinkedOutcome]:
-    """Yield event-driven outcomes: all contacts at once by Newton's LCP, then each order in which they may close."""
+def _orders(balls: LinkedBalls) -> Iterator[tuple[str, Floats]]:
+    """Yield orders and their initial gaps: all contacts at once, then each order in which they may close."""
     c = len(balls.contacts)
-    yield _event_driven(balls, "all at once, Newton's LCP", np.zeros(c))
+    yield "all at once, Newton's LCP", np.zeros(c)
     if balls.name.startswith("cradle"):
-        yield _event_driven(balls, "one after the other along the row", np.linspace(0.0, _GAP * (c - 1), c))
+        yield "one after the other along the row", np.linspace(0.0, _GAP * (c - 1), c)
         return
     for order in permutations(balls.approaching()):
         start = np.zeros(c)
-        for rank, contact in enumerate(order):
-            start[contact] = _GAP * rank
-        yield _event_driven(balls, "contact " + ", then ".join(str(k) for k in order), start)
+        start[list(order)] = _GAP * np.arange(len(order))
+        yield "contact " + ", then ".join(map(str, order)), start
 
 
-def _event_driven(balls: LinkedBalls, order: str, start: Floats) -> LinkedOutcome:
-    d = balls.velocity.size
-    rows = balls.relative_rows(range(len(balls.contacts)))
-    system = LinearSystem(np.eye(d), np.zeros(d), rows, start, 1.0)
-    path = event_driven(system, np.zeros(d), balls.velocity.ravel(), duration=10.0)
-    return LinkedOutcome(balls.name, SEQUENTIAL, order, balls.velocity, path.v[-1].reshape(-1, 2))
+def _rows(_: Study, balls: LinkedBalls) -> Iterator[Row]:
+    """Yield a row per ball of each outcome, with the relative changes of kinetic energy and momentum."""
+    before, total = balls.velocity, balls.velocity.sum(axis=0)
+    for treatment, words, velocity in outcomes(balls):
+        energy = float(np.sum(velocity**2) / np.sum(before**2) - 1.0)
+        momentum = float(np.linalg.norm(velocity.sum(axis=0) - total) / np.linalg.norm(total))
+        for ball, after in enumerate(velocity):
+            yield {"problem": balls.name, "treatment": treatment, "rows or order": words, "ball": ball,
+                   "v_x before [m/s]": float(before[ball, 0]), "v_x after [m/s]": float(after[0]),
+                   "v_y after [m/s]": float(after[1]), "energy change": energy,
+                   "momentum change": momentum}  # fmt: skip
 
 
-def study_linked_impacts(failures: list[Failure] | None = None) -> tuple[LinkedOutcome, ...]:
-    """Return all outcomes: cradles of two to seven balls, and Bernoulli's problem."""
-    problems = [*(cradle(n) for n in range(2, 8)), bernoulli()]
-    return tuple(of_each(problems, outcomes, failures, lambda balls: balls.name))
+def _changes(table: Table) -> tuple[float, float, float]:
+    """Return the largest change of energy, and the smallest and largest one of momentum."""
+    momentum = table.column("momentum change")
+    return max(map(abs, table.column("energy change"))), min(momentum), max(momentum)
 
 
-def linked_table(found: Sequence[LinkedOutcome]) -> Table:
-    """Return a table with one row per ball of each outcome."""
-    columns = ("problem", "treatment", "rows or order", "ball", "v_x before [m/s]", "v_x after [m/s]",
-               "v_y after [m/s]", "energy change", "momentum change")  # fmt: skip
-    rows = [
-        (o.problem, o.treatment, o.rows, ball, float(o.before[ball, 0]), float(after[0]), float(after[1]),
-         o.energy_change, o.momentum_change)
-        for o in found for ball, after in enumerate(o.velocity)
-    ]  # fmt: skip
-    note = "Elastic impacts of equal frictionless balls; changes are relative to what there was before."
-    return titled(columns, rows, note=note)
+def _split(table: Table) -> tuple[Table, Table]:
+    """Return the rows without, and those with, the paper's per-body rows."""
+    per_body = [treatment == PER_BODY for treatment in table.column("treatment")]
+    return table.only(not one for one in per_body), table.only(per_body)
 
 
-def _changes(found: Sequence[LinkedOutcome]) -> tuple[float, float]:
-    """Return the largest change of energy and of momentum."""
-    return max(abs(o.energy_change) for o in found), max(o.momentum_change for o in found)
-
-
-def conserved(found: Sequence[LinkedOutcome]) -> Part:
-    """Return the part on relative rows and sequences: their changes of energy and momentum."""
-    energy, momentum = _changes([o for o in found if o.treatment != PER_BODY])
-    return Part(
-        f"Newton's cradles of 2 to 7 balls and Bernoulli's three balls ({len({o.problem for o in found})} problems): "
+def findings(table: Table) -> Iterator[Part]:
+    """Yield the parts on conservation, on erratum 3, and on the choice of rows."""
+    kept, lost = _split(table)
+    energy, _, momentum = _changes(kept)
+    yield Part(
+        f"Newton's cradles of 2 to 7 balls and Bernoulli's three balls ({len(set(kept.column('problem')))} problems): "
         f"with relative rows (12), solved at once or event by event, energy changes by at most {energy:.1e} and "
         f"momentum by at most {momentum:.1e} (tolerance {CONSERVED:g}).",
         REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
-
-
-def per_body(found: Sequence[LinkedOutcome]) -> Part:
-    """Return the part on erratum 3: the change of momentum with the paper's per-body rows."""
-    lost = [o for o in found if o.treatment == PER_BODY]
-    energy, least = _changes(lost)[0], min(o.momentum_change for o in lost)
-    return Part(
+    energy, least, _ = _changes(lost)
+    cases = len({(row["problem"], row["rows or order"]) for row in lost.records()})
+    yield Part(
         f"With the per-body rows (13)-(14) energy changes by at most {energy:.1e}, but momentum changes by at least "
-        f"{least:.2g} times its value in all {len(lost)} cases: the striking ball rebounds as from a wall (erratum 3).",
+        f"{least:.2g} times its value in all {cases} cases: the striking ball rebounds as from a wall (erratum 3).",
         REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
+    if five := table.where(problem="cradle of 5").records():
+        yield _rows_decide(five)
 
 
-def rows_decide(found: Sequence[LinkedOutcome]) -> Part:
+def _rows_decide(five: Sequence[Row]) -> Part:
     """Return the part on the cradle of five: three choices of rows conserve energy and momentum, but differ."""
-    five = {(o.treatment, o.rows): o.velocity[:, 0] for o in found if o.problem == "cradle of 5"}
-    after = {"all touching rows": five[RELATIVE, ALL], "the approaching row": five[RELATIVE, APPROACHING],
-             "one after the other": next(v for (_, rows), v in five.items() if "one after" in rows)}  # fmt: skip
+    choices = {"all touching rows": (RELATIVE, ALL), "the approaching row": (RELATIVE, APPROACHING),
+               "one after the other": (SEQUENTIAL, "one after the other along the row")}  # fmt: skip
+    after = {name: np.array([row["v_x after"] for row in five if (row["treatment"], row["rows or order"]) == choice])
+             for name, choice in choices.items()}  # fmt: skip
     words = "; ".join(f"{name} ({', '.join(f'{v + 0.0:.1f}' for v in values)})" for name, values in after.items())
     apart = min(float(np.abs(a - b).max()) for a, b in combinations(after.values(), 2))
     return Part(
@@ -205,9 +176,17 @@ def rows_decide(found: Sequence[LinkedOutcome]) -> Part:
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
 
 
-def linked_in_short(found: Sequence[LinkedOutcome]) -> str:
+def in_short(table: Table) -> str:
     """Return the sentence for the first page."""
-    kept = max(_changes([o for o in found if o.treatment != PER_BODY]))
-    least = min(o.momentum_change for o in found if o.treatment == PER_BODY)
-    return (f"Impacts between touching balls conserve energy and momentum to {kept:.1e} with relative rows (12), while "
-            f"the paper's per-body rows (13)-(14) change the total momentum by at least {least:.2g} times its value")
+    kept, lost = _split(table)
+    energy, _, momentum = _changes(kept)
+    return (f"Impacts between touching balls conserve energy and momentum to {max(energy, momentum):.1e} with relative "
+            f"rows (12), while the paper's per-body rows (13)-(14) change the total momentum by at least "
+            f"{_changes(lost)[1]:.2g} times its value")  # fmt: skip
+
+
+LINKED_IMPACTS = Check(
+    key="linked impacts", question="What do touching balls do in an elastic impact?",
+    cases=lambda _: (*(cradle(n) for n in range(2, 8)), bernoulli()), row=_rows, says=findings,
+    note="Elastic impacts of equal frictionless balls; changes are relative to what there was before.",
+)  # fmt: skip

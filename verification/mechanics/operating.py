@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import IapbError
-from iapb.scene import Scene, find_scene, load_scene
+from iapb.scene import Scene
 from iapb.simulation import Simulation
-from verification.finding import Column, Failure, Part, Table, check_depth, of_each, table_of, verdict_of_law
+from verification.check import Check, Study
 from verification.mechanics.hand_paths import PATHS, Path
+from verification.table import Table
 
 Floats = NDArray[np.float64]
 
@@ -35,25 +36,6 @@ ROUNDING = 1e-12  # relative tolerance if hardly any joint turns
 # σ_min / σ_max of the hand's Jacobian below which the arm is within about a degree of straight or folded.
 SINGULAR = 0.02
 
-COLUMNS = (
-    Column("path", condition=True),
-    Column("held link", condition=True),
-    Column("held at", "m", condition=True),
-    Column("speed", "m/s", condition=True),
-    Column("rate", "Hz", condition=True),
-    Column("closest to singular", "σ_min/σ_max"),
-    Column("steps near singular"),
-    Column("largest joint speed", "rad/s"),
-    Column("largest hand force", "N"),
-    Column("largest stored energy", "J"),
-    Column("energy put in", "J"),
-    Column("stored beyond what was put in", "relative"),
-    Column("residual", "relative"),
-    Column("tolerance", "relative"),
-    Column("fault"),
-)
-
-
 class Grip(NamedTuple):
     """The held body, and the distance [m] of the held point along it."""
 
@@ -67,34 +49,21 @@ class Grip(NamedTuple):
         return sum(LENGTHS[link] for link in links[: links.index(self.body)]) + self.distance
 
 
-def operating(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
-    """Lead the arm by every link and point along every path, at every speed."""
-    check_depth(depth)
-    statement = (
-        "Led by any point of any link, the arm passes its singular poses with finite motion and bounded energy."
-    )
-    tolerance = (
-        "every number is finite; the energy residual, relative to the energy exchanged, is at most the largest joint "
-        "rotation per step [rad], the error of a first-order method; and arm and spring store at most that much more "
-        "than the hand has put in"
-    )
-    return judged(table_of(COLUMNS, _rows(depth, failures), note=f"{statement} Tolerance: {tolerance}."))
-
-
-def _rows(depth: str, failures: list[Failure] | None) -> Iterator[dict[str, Any]]:
-    scene = load_scene(find_scene(SCENE))
+def _cases(study: Study) -> Iterator[tuple[str, Grip, float, float]]:
+    depth = study.depth
     grips = [Grip(body, part * length) for body, length in LENGTHS.items() for part in HOLDS[depth]]
+    return product(PATHS, grips, SPEEDS[depth], RATES[depth])
 
-    def rows_of(case: tuple[str, Grip, float, float]) -> Iterator[dict[str, Any]]:
-        path, grip, speed, rate = case
-        head = {"path": path, "held link": grip.body, "held at": grip.distance, "speed": speed, "rate": rate}
-        yield head | operate(scene, grip, path, speed, rate)
 
-    return of_each(product(PATHS, grips, SPEEDS[depth], RATES[depth]), rows_of, failures)
+def _row(study: Study, case: tuple[str, Grip, float, float]) -> dict[str, Any]:
+    path, grip, speed, rate = case
+    head = {"path": path, "held link": grip.body, "held at [m]": grip.distance, "speed [m/s]": speed, "rate [Hz]": rate}
+    found = operate(study.scene(SCENE), grip, path, speed, rate)
+    return head | found | {"holds": holds(found)}
 
 
 def operate(scene: Scene, grip: Grip, path: str, speed: float, rate: float) -> dict[str, Any]:
-    """Lead the arm along one path and return the largest values and the energy balance."""
+    """Lead the arm along one path; return the largest values and the energy balance, or nothing if it breaks off."""
     held = {
         "hand.body": grip.body,
         "hand.point": [grip.distance, 0.0],
@@ -106,8 +75,8 @@ def operate(scene: Scene, grip: Grip, path: str, speed: float, rate: float) -> d
     try:
         for k in range(int((way.length / speed + AFTER) * rate)):
             arm.follow(way, speed * k / rate, speed * (k + 1) / rate)
-    except IapbError as error:
-        return {"fault": str(error)}
+    except IapbError:
+        return {}
     return arm.measured()
 
 
@@ -158,36 +127,42 @@ class Led:
         state = self.simulation.state
         kinetic, whole = self.mechanism.kinetic_energy(state.q, state.v), max(self.exchanged, NOTHING)
         return {
-            "closest to singular": min(self.ratios), "steps near singular": sum(r <= SINGULAR for r in self.ratios),
-            "largest joint speed": self.fastest, "largest hand force": self.strongest,
-            "largest stored energy": self.largest, "energy put in": self.put_in,
-            "stored beyond what was put in": self.excess / max(self.largest, NOTHING),
-            "residual": (kinetic - self.work) / whole,
-            "tolerance": max(self.fastest * self.simulation.system.dt, ROUNDING), "fault": "",
+            "closest to singular [σ_min/σ_max]": min(self.ratios),
+            "steps near singular": sum(r <= SINGULAR for r in self.ratios),
+            "largest joint speed [rad/s]": self.fastest, "largest hand force [N]": self.strongest,
+            "largest stored energy [J]": self.largest, "energy put in [J]": self.put_in,
+            "stored beyond what was put in [relative]": self.excess / max(self.largest, NOTHING),
+            "residual [relative]": (kinetic - self.work) / whole,
+            "tolerance [relative]": max(self.fastest * self.simulation.system.dt, ROUNDING),
         }  # fmt: skip
 
 
-def judged(table: Table) -> Table:
-    """Judge each row: the run must be finite, without a fault, and its energy balance must close."""
-    return table.judged(_holds)
-
-
-def _holds(row: dict[str, Any]) -> bool:
-    if row["fault"]:
+def holds(found: dict[str, Any]) -> bool:
+    """Whether the run is finite and was not broken off, and its energy balance closes."""
+    if not found:
         return False
-    figures = [value for value in row.values() if isinstance(value, float)]
-    made_up = max(abs(row["residual"]), row["stored beyond what was put in"])
-    return bool(np.all(np.isfinite(figures)) and made_up <= row["tolerance"])
+    figures = [value for value in found.values() if isinstance(value, float)]
+    made_up = max(abs(found["residual [relative]"]), found["stored beyond what was put in [relative]"])
+    return bool(np.all(np.isfinite(figures)) and made_up <= found["tolerance [relative]"])
 
 
-def led(table: Table) -> Part:
-    """Return the part on led arms: distance to singular poses, joint speeds and energy residual."""
+def led(table: Table) -> str:
+    """Return the number of steps near singular poses, joint speeds and energy residual in words."""
     rows = table.records()
-    whole = [row for row in rows if not row["fault"]]
+    whole = [row for row in rows if row["residual"] is not None]
     share = max(abs(row["residual"]) / row["tolerance"] for row in whole)
     near = sum(row["steps near singular"] for row in whole)
-    return Part(
+    return (
         f"An arm is led along {len(rows)} paths through its singular poses, with {near:,} steps within about a degree "
         f"of straight or folded. {len(rows) - len(whole)} simulations break off. No joint turns faster than "
         f"{max(row['largest joint speed'] for row in whole):.3g} rad/s, and the energy residual stays below "
-        f"{share:.2g} of the first-order error estimate.", verdict_of_law(table.holds))  # fmt: skip
+        f"{share:.2g} of the first-order error estimate.")  # fmt: skip
+
+
+OPERATING = Check(
+    key="operating", question="Does an arm that is led pass its singular poses?", cases=_cases, row=_row, says=led,
+    note="Led by any point of any link, the arm passes its singular poses with finite motion and bounded energy. "
+         "Tolerance: every number is finite; the energy residual, relative to the energy exchanged, is at most the "
+         "largest joint rotation per step [rad], the error of a first-order method; and arm and spring store at most "
+         "that much more than the hand has put in.",
+)  # fmt: skip

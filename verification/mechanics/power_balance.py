@@ -17,23 +17,15 @@ from numpy.typing import NDArray
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_mechanism, random_state
-from verification.finding import (
-    Column,
-    Failure,
-    Part,
-    Row,
-    Table,
-    check_depth,
-    of_each,
-    table_of,
-    verdict_of_law,
-)
+from verification.check import Check, Study
 from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
+from verification.table import Row, Table
 
 Floats = NDArray[np.float64]
 
 FIELD = np.array([0.5, -9.81, 2.0])  # [m/s^2], along no axis
-METHODS = (INTEGRATORS["semi_implicit_euler"], INTEGRATORS["midpoint"], COMMUTATOR_FREE_4)
+METHODS = {method.name: method for method in
+           (INTEGRATORS["semi_implicit_euler"], INTEGRATORS["midpoint"], COMMUTATOR_FREE_4)}  # fmt: skip
 SIZES = (1, 3, 10, 30)  # joints
 TREES = {"quick": 15, "full": 200}
 LONGEST = 2e-2  # [s]; halved until the defect is below SMALL^order, where the leading error term dominates
@@ -47,43 +39,9 @@ LARGEST_CONDITION = 1e12
 LEAST_SHARE = 0.5  # share of the trees that must show an order; if a term is missing, no tree does
 SEED = 20050603
 
-COLUMNS = (
-    Column("integrator", condition=True),
-    Column("joints", condition=True),
-    Column("trees", condition=True),
-    Column("trees that show an order"),
-    Column("step", "s"),
-    Column("median defect", "of |τ|·|v| dt"),
-    Column("median order"),
-    Column("declared order"),
-)
-DEFINITE_COLUMNS = (
-    Column("joints", condition=True),
-    Column("mass matrices", condition=True),
-    Column("judged, condition ≤ 1e12"),
-    Column("largest condition judged"),
-    Column("least eigenvalue × condition"),
-)
-
-
-def power_balance(
-    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
-) -> Table:
-    """Measure the order with which the defect of the power balance falls, for every integrator and tree size."""
-    check_depth(depth)
-
-    def rows_of(case: tuple[Integrator, int]) -> list[dict[str, Any]]:
-        method, joints = case
-        return [_row(method, joints, TREES[depth], np.random.default_rng([seed, joints]))]
-
-    cases = product(METHODS, SIZES)
-    rows = of_each(cases, rows_of, failures, lambda case: f"{case[0].name}, {case[1]} joints")
-    statement = "Energy changes by the work of the generalized forces, to the order of the integrator."
-    tolerance = f"median order within {ORDER_TOLERANCE} of the declared order"
-    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}."))
-
-
-def _row(method: Integrator, joints: int, trees: int, rng: np.random.Generator) -> dict[str, Any]:
+def _row(study: Study, case: tuple[str, int]) -> Row:
+    (name, joints), trees = case, TREES[study.depth]
+    method, rng = METHODS[name], np.random.default_rng([SEED, joints])
     found, tried = [], 0
     for _ in range(trees):
         mechanism = random_mechanism(rng, joints)
@@ -93,9 +51,9 @@ def _row(method: Integrator, joints: int, trees: int, rng: np.random.Generator) 
             tried += 1
             found += order_of(mechanism, method, q, v, tau)
     medians = np.median(found, axis=0) if found else np.full(3, np.nan)
-    return {"integrator": method.name, "joints": joints, "trees": tried, "trees that show an order": len(found),
-            "step": float(medians[0]), "median defect": float(medians[1]), "median order": float(medians[2]),
-            "declared order": method.order}  # fmt: skip
+    return {"integrator": name, "joints": joints, "trees": tried, "trees that show an order": len(found),
+            "step [s]": float(medians[0]), "median defect [of |τ|·|v| dt]": float(medians[1]),
+            "median order": float(medians[2]), "declared order": method.order}  # fmt: skip
 
 
 def order_of(
@@ -138,31 +96,15 @@ def _condition(mass: Floats) -> float:
     return float(np.linalg.cond(_scaled(mass))) if np.all(np.diag(mass) > 0.0) else np.inf
 
 
-def judged(table: Table) -> Table:
-    """Judge each row: the median order must be the declared one, and at least half of the trees must show an order."""
-    return table.judged(_holds)
-
-
-def _holds(row: Row) -> bool:
+def as_declared(row: Row) -> bool:
+    """Whether the median order is the declared one, and at least half of the trees show an order."""
     enough = row["trees that show an order"] >= LEAST_SHARE * row["trees"]
     return bool(enough and abs(row["median order"] - row["declared order"]) <= ORDER_TOLERANCE)
 
 
-def positive_definite(
-    depth: str = "quick", seed: int = SEED, failures: list[Failure] | None = None
-) -> Table:
-    """Check that the least eigenvalue of random trees' mass matrices, scaled to a unit diagonal, is positive."""
-    check_depth(depth)
-    rows = of_each(SIZES, lambda joints: [_definite(joints, 10 * TREES[depth], seed)], failures,
-                   lambda joints: f"{joints} joints")  # fmt: skip
-    statement = "The mass matrix is positive definite wherever rounding permits a judgement."
-    tolerance = f"least eigenvalue above zero where the scaled condition is at most {LARGEST_CONDITION:g}"
-    table = table_of(DEFINITE_COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}.")
-    return table.judged(lambda row: bool(row["least eigenvalue × condition"] > 0.0))
-
-
-def _definite(joints: int, count: int, seed: int) -> dict[str, Any]:
-    rng = np.random.default_rng([seed, joints, 1])
+def _definite(study: Study, joints: int) -> Row:
+    count = 10 * TREES[study.depth]
+    rng = np.random.default_rng([SEED, joints, 1])
     conditions, least = [], []
     for _ in range(count):
         mechanism = random_mechanism(rng, joints)
@@ -175,29 +117,27 @@ def _definite(joints: int, count: int, seed: int) -> dict[str, Any]:
             "largest condition judged": max(conditions), "least eigenvalue × condition": min(least)}  # fmt: skip
 
 
-def orders(table: Table) -> Part:
-    """Return the part on the power balance: the measured orders of each integrator."""
+def orders(table: Table) -> str:
+    """Return the measured orders of each integrator in words."""
     found = "; ".join(
         f"{words(name)} {span([row['median order'] for row in rows])} (declared {rows[0]['declared order']})"
         for (name,), rows in by(table.records(), "integrator").items()
     )
-    return Part("Random linkages of 1 to 30 joints: the difference between change of energy and work of the forces "
-                f"falls with the order of the integrator. Measured: {found}.", verdict_of_law(table.holds))  # fmt: skip
+    return ("Random linkages of 1 to 30 joints: the difference between change of energy and work of the forces falls "
+            f"with the order of the integrator. Measured: {found}.")  # fmt: skip
 
 
-def definiteness(table: Table) -> Part:
-    """Return the part on definiteness: the number of matrices and their least eigenvalue."""
+def definiteness(table: Table) -> str:
+    """Return the number of matrices and their least eigenvalue in words."""
     rows = table.records()
     judged = sum(row["judged, condition ≤ 1e12"] for row in rows)
     least = min(row["least eigenvalue × condition"] for row in rows)
-    verdict = verdict_of_law(table.holds)
     if not table.passed:
-        return Part("A random mass matrix with a moderate condition number is not positive definite.", verdict)
-    return Part(
-        f"Of {sum(row['mass matrices'] for row in rows)} random mass matrices, {judged} have a scaled condition number "
-        f"of at most 1e12 (largest {max(row['largest condition judged'] for row in rows):.1e}). All of these are "
-        f"positive definite: the least eigenvalue times the condition number is never below {least:.2g}.",
-        verdict)  # fmt: skip
+        return "A random mass matrix with a moderate condition number is not positive definite."
+    largest, count = max(row["largest condition judged"] for row in rows), sum(row["mass matrices"] for row in rows)
+    return (f"Of {count} random mass matrices, {judged} have a scaled condition number of at most 1e12 (largest "
+            f"{largest:.1e}). All of these are positive definite: the least eigenvalue times the condition number is "
+            f"never below {least:.2g}.")  # fmt: skip
 
 
 def by(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
@@ -218,3 +158,17 @@ def words(name: str) -> str:
     """Return the printed name of an integrator."""
     return {"semi_implicit_euler": "semi-implicit Euler", "runge_kutta_4": "Runge-Kutta 4",
             "commutator_free_4": "commutator-free Runge-Kutta 4"}.get(name, name)  # fmt: skip
+
+
+POWER_BALANCE = Check(
+    key="power balance", question="Energy changes by the work of the generalized forces.",
+    cases=lambda _: product(METHODS, SIZES), row=_row, holds=as_declared, says=orders,
+    note="Energy changes by the work of the generalized forces, to the order of the integrator. Tolerance: median "
+         f"order within {ORDER_TOLERANCE} of the declared order.",
+)  # fmt: skip
+POSITIVE_DEFINITE = Check(
+    key="positive definite", question="The mass matrix is positive definite.", cases=lambda _: SIZES, row=_definite,
+    holds=lambda row: bool(row["least eigenvalue × condition"] > 0.0), says=definiteness,
+    note="The mass matrix is positive definite wherever rounding permits a judgement. Tolerance: least eigenvalue "
+         f"above zero where the scaled condition is at most {LARGEST_CONDITION:g}.",
+)  # fmt: skip

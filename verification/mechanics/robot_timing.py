@@ -20,7 +20,7 @@ from reference.random_mechanisms import random_state
 from reference.rigid_body import model_from_urdf
 from verification.clock import seconds, take_turns
 from verification.finding import Column, Failure, Table, check_depth, of_each, table_of
-from verification.mechanics.robots import SEED, robot_files
+from verification.mechanics.against_pinocchio import SEED, robot_files
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,6 @@ The study covers every integrator of the compiled simulation, and the fourth-ord
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from functools import cache
 from itertools import product
 from typing import Any, NamedTuple
@@ -19,10 +18,11 @@ from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
-from verification.finding import Column, Failure, Part, Table, check_depth, of_each, table_of, verdict_of_law
+from verification.check import Check, Study
 from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
 from verification.mechanics.power_balance import by, span, words
 from verification.mechanics.torque_free import TorqueFreeBody
+from verification.table import Table
 
 Floats = NDArray[np.float64]
 
@@ -45,20 +45,6 @@ HALVINGS = {"quick": 4, "full": 6}
 ORDER_TOLERANCE = 0.15  # size of the next error term at these steps
 ROUNDING = 1e-10  # smaller errors contain the rounding of some thousand steps (1e-12) and show no order
 
-COLUMNS = (
-    Column("motion", condition=True),
-    Column("integrator", condition=True),
-    Column("step", "s", condition=True),
-    Column("attitude error", "rad"),
-    Column("rate error", "rad/s"),
-    Column("place error", "m"),
-    Column("energy drift", "relative"),
-    Column("momentum drift", "relative"),
-    Column("order"),
-    Column("energy order"),
-    Column("momentum order"),
-    Column("declared order"),
-)
 DRIFT_ORDERS = ("energy order", "momentum order")
 ORDERS = ("order", *DRIFT_ORDERS)
 
@@ -75,24 +61,16 @@ class Tumble(NamedTuple):
     velocity: Floats
 
 
-def tumbling(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
-    """Measure every integrator on both motions, with repeatedly halved steps."""
-    check_depth(depth)
+METHODS = {method.name: method for method in (*INTEGRATORS.values(), COMMUTATOR_FREE_4)}
 
-    def rows_of(case: tuple[str, Integrator]) -> Iterator[dict[str, Any]]:
-        motion, method = case
-        path = path_by_python if method is COMMUTATOR_FREE_4 else path_compiled
-        head = {"motion": motion, "integrator": method.name, "declared order": method.group_order}
-        return (head | row for row in _halved(MOTIONS[motion], method, path, HALVINGS[depth]))
 
-    cases = product(MOTIONS, (*INTEGRATORS.values(), COMMUTATOR_FREE_4))
-    rows = of_each(cases, rows_of, failures, lambda case: f"{case[0]}, {case[1].name}")
-    statement = (
-        "Attitude and rate converge to the closed form with the order that the integrator declares; the drifts of "
-        "energy and angular momentum fall at least as fast."
-    )
-    tolerance = f"order within {ORDER_TOLERANCE} of the declared one, by the two finest steps above rounding"
-    return judged(table_of(COLUMNS, rows, note=f"{statement} Tolerance: {tolerance}."))
+def _rows(study: Study, case: tuple[str, str]) -> list[dict[str, Any]]:
+    """Return the rows of one motion by one integrator, with repeatedly halved steps."""
+    (motion, name), method = case, METHODS[case[1]]
+    path = path_by_python if method is COMMUTATOR_FREE_4 else path_compiled
+    head = {"motion": motion, "integrator": name}
+    halved = _halved(MOTIONS[motion], method, path, HALVINGS[study.depth])
+    return judged([head | row | {"declared order": method.group_order} for row in halved])
 
 
 def exact(body: TorqueFreeBody, time: float) -> Tumble:
@@ -148,11 +126,12 @@ def _halved(
     before = dict.fromkeys(ORDERS, np.nan)
     for k in range(halvings):
         steps = COARSEST[method.name] << k
-        row = {"step": DURATION / steps, **errors(path(body, method, steps), truth, body)}
-        both = float(np.hypot(row["attitude error"], row["rate error"] / body.third_rate))
-        now = {"order": both, "energy order": row["energy drift"], "momentum order": row["momentum drift"]}
+        row = {"step [s]": DURATION / steps, **errors(path(body, method, steps), truth, body)}
+        both = float(np.hypot(row["attitude error [rad]"], row["rate error [rad/s]"] / body.third_rate))
+        now = {"order": both, "energy order": row["energy drift [relative]"],
+               "momentum order": row["momentum drift [relative]"]}  # fmt: skip
         shown = {name: float(np.log2(before[name] / now[name])) for name in ORDERS if now[name] > ROUNDING}
-        yield row | {name: order for name, order in shown.items() if np.isfinite(order)}
+        yield row | {name: shown[name] if np.isfinite(shown.get(name, np.nan)) else None for name in ORDERS}
         before = now
 
 
@@ -162,27 +141,21 @@ def errors(path: Tumble, truth: Tumble, body: TorqueFreeBody) -> dict[str, float
     energy = 0.5 * (path.rate**2 @ moments + MASS * np.sum(path.velocity**2, axis=1))
     spin = np.einsum("nij,nj->ni", path.axes, moments * path.rate)
     return {
-        "attitude error": float(np.linalg.norm(path.axes[-1] - truth.axes)) / np.sqrt(2.0),  # of small angles
-        "rate error": float(np.linalg.norm(path.rate[-1] - truth.rate)),
-        "place error": float(np.linalg.norm(path.place[-1] - truth.place)),
-        "energy drift": float(np.abs(energy / energy[0] - 1.0).max()),
-        "momentum drift": float(np.linalg.norm(spin - spin[0], axis=1).max()) / body.momentum,
+        "attitude error [rad]": float(np.linalg.norm(path.axes[-1] - truth.axes)) / np.sqrt(2.0),  # of small angles
+        "rate error [rad/s]": float(np.linalg.norm(path.rate[-1] - truth.rate)),
+        "place error [m]": float(np.linalg.norm(path.place[-1] - truth.place)),
+        "energy drift [relative]": float(np.abs(energy / energy[0] - 1.0).max()),
+        "momentum drift [relative]": float(np.linalg.norm(spin - spin[0], axis=1).max()) / body.momentum,
     }
 
 
-def judged(table: Table) -> Table:
-    """Judge the last measurable order of each series: it must be the declared one; drifts may have a higher order."""
-    series: dict[Any, list[int]] = {}
-    records = table.records()
-    for k, row in enumerate(records):
-        series.setdefault((row["motion"], row["integrator"]), []).append(k)
-    outcomes: list[bool | None] = [None] * len(records)
-    for places in series.values():
-        shown = [k for k in places if records[k]["order"] is not None]
-        if shown:
-            last = {name: [records[k][name] for k in places if records[k][name] is not None] for name in ORDERS}
-            outcomes[shown[-1]] = _as_declared(last, records[shown[-1]]["declared order"])
-    return replace(table, holds=tuple(outcomes))
+def judged(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Judge the last measurable order of a series: it must be the declared one; drifts may have a higher order."""
+    shown = [row for row in rows if row["order"] is not None]
+    if shown:
+        last = {name: [row[name] for row in rows if row[name] is not None] for name in ORDERS}
+        shown[-1]["holds"] = _as_declared(last, shown[-1]["declared order"])
+    return rows
 
 
 def _as_declared(shown: dict[str, list[float]], declared: int) -> bool:
@@ -192,13 +165,22 @@ def _as_declared(shown: dict[str, list[float]], declared: int) -> bool:
     return bool(equal and all(order >= declared - ORDER_TOLERANCE for order in drifts))
 
 
-def convergence(table: Table) -> Part:
-    """Return the part on convergence: the measured orders of each integrator."""
+def convergence(table: Table) -> str:
+    """Return the measured orders of each integrator in words."""
     judges = [row for row, held in zip(table.records(), table.holds, strict=True) if held is not None]
     series = "; ".join(
         f"{words(name)}: {span([row['order'] for row in rows])} (declared {rows[0]['declared order']})"
         for (name,), rows in by(judges, "integrator").items()
     )
-    return Part("The motion of a free tumbling body converges to the closed form with the order that the integrator "
-                "declares; its energy and angular momentum converge at least as fast. Measured orders: "
-                f"{series}.", verdict_of_law(table.holds))  # fmt: skip
+    return ("The motion of a free tumbling body converges to the closed form with the order that the integrator "
+            "declares; its energy and angular momentum converge at least as fast. Measured orders: "
+            f"{series}.")  # fmt: skip
+
+
+TUMBLING = Check(
+    key="tumbling", question="A tumbling body converges to the closed form.",
+    cases=lambda _: product(MOTIONS, METHODS), row=_rows, says=convergence,
+    note="Attitude and rate converge to the closed form with the order that the integrator declares; the drifts of "
+         f"energy and angular momentum fall at least as fast. Tolerance: order within {ORDER_TOLERANCE} of the "
+         "declared one, by the two finest steps above rounding.",
+)  # fmt: skip

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from verification.check import Study
 from verification.mechanics import coordinate_invariance as study
 from verification.mechanics.planar_arm import Contact
 
@@ -39,7 +40,7 @@ def test_the_hands_jacobian_is_the_derivative_of_its_place():
 
 @pytest.fixture(scope="module")
 def finding():
-    return study.coordinate_invariance()
+    return study.COORDINATES.table(Study())
 
 
 def test_every_impact_is_within_its_tolerance(finding):
@@ -70,4 +71,4 @@ def test_a_map_that_is_not_the_derivative_is_seen(monkeypatch):
 
     monkeypatch.setattr(study, "_transformed", bent)
     monkeypatch.setattr(study, "ELBOWS", (1.0, 0.0))
-    assert study.coordinate_invariance().passed is False
+    assert study.COORDINATES.table(Study()).passed is False
