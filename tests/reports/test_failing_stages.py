@@ -54,7 +54,7 @@ def of_claims(patch: Patch, folder: Path) -> list[str]:
     chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
     chosen["C01"] = replace(chosen["C01"], cases=broken(chosen["C01"].cases, lambda study: True))
     patch.setattr(verification.claims, "CLAIMS", chosen)
-    patch.setattr(arm, "strike", broken(arm.strike, lambda arm, place, angle, e: (place, angle) ==
+    patch.setattr(arm, "strike", broken(arm.strike, lambda robot, place, angle, e: (place, angle) ==
                                                 (arm.PLACES[0], arm.ANGLES[0])))  # fmt: skip
     failures: list[Failure] = []
     first, second = claims.compute(Runner(folder), "quick", nothing, failures)

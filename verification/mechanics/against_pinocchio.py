@@ -86,7 +86,7 @@ def robot_files(folder: str | Path | None = None) -> tuple[list[Path], str]:
 def _cases(study: Study) -> Iterator[Case]:
     count, written = TREES[study.depth], WRITTEN[study.depth]
     for n in TREE_SIZES:
-        yield Case(TREES_SET, f"trees of {n}", "random", [SEED, n], partial(_trees, n, count, None))
+        yield Case(TREES_SET, f"trees of {n}", "random", [SEED, n], partial(_trees, n, count, tuple(KINDS)))
     for kind, n in product(KINDS, KIND_SIZES):
         kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")  # a tree of fixed joints alone has nothing to compare
         yield Case("joint kinds", f"{n} {kind}", "random", [SEED, n], partial(_trees, n, 1, kinds))
@@ -102,9 +102,8 @@ def _cases(study: Study) -> Iterator[Case]:
         yield Case(OTHERS, path.stem, base, [SEED, floating], partial(_read, [path], floating))
 
 
-def _trees(joints: int, count: int, kinds: tuple[str, ...] | None, rng: np.random.Generator) -> Pairs:
-    options = {"kinds": kinds} if kinds else {}
-    trees = [random_mechanism(rng, joints, **options) for _ in range(count)]
+def _trees(joints: int, count: int, kinds: tuple[str, ...], rng: np.random.Generator) -> Pairs:
+    trees = [random_mechanism(rng, joints, kinds) for _ in range(count)]
     return [(tree, model_of(tree)) for tree in trees if tree.nv]
 
 
