@@ -3,9 +3,9 @@
 `kernel` compiles with numba, caches on disk, uses no fastmath and *no allocator*: `_nrt=False` leaves out the memory
 runtime, so a kernel that would allocate does not compile. The compiler thus checks that kernels do not allocate.
 
-`block` passes a NamedTuple of arrays, also a nested one, to kernels as one pointer. Numba passes a tuple member by
-member, some 1,300 numbers for a whole world; a step then took 150 s to compile and 60 µs to run. With a pointer it
-takes a tenth of the compile time and a hundredth of the run time. In Python a block has the attributes of its tuple.
+`block` passes a NamedTuple or dict of arrays, also a nested one, to kernels as one pointer. Numba passes a tuple member
+by member, some 1,300 numbers for a whole world; a step then took 150 s to compile and 60 µs to run. With a pointer it
+takes a tenth of the compile time and a hundredth of the run time. In Python a block has the attributes of its content.
 
 Only what a scene calls for is compiled: a flag that is off (`flag`) is part of a block's type, and kernels that need it
 are replaced by a constant. `IAPB_COMPILE=whole` compiles everything once for all scenes, which many scenes share.
@@ -13,17 +13,15 @@ are replaced by a constant. `IAPB_COMPILE=whole` compiles everything once for al
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import inspect
 import os
-import struct
 import warnings
-from collections import namedtuple
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
-from itertools import chain
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import accumulate
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -72,22 +70,9 @@ def _stamp_of(function: Callable[..., Any]) -> str:
     return hashlib.sha256(_STAMP.encode() + path.read_bytes()).hexdigest()
 
 
-class Absent:
-    """A flag that is off, whose kernels are not compiled; false."""
-
-    def __bool__(self) -> bool:
-        return False
-
-    def __int__(self) -> int:
-        return 0
-
-
-ABSENT = Absent()
-
-
 def flag(on: bool) -> Any:
-    """Return the value of a flag in a block; kernels that need a flag which is off are not compiled."""
-    return True if on else False if os.environ.get("IAPB_COMPILE") == "whole" else ABSENT
+    """Return the value of a flag in a block; kernels that need a flag which is off, None, are not compiled."""
+    return True if on else False if os.environ.get("IAPB_COMPILE") == "whole" else None
 
 
 def kernel(function: Callable[..., Any] | None = None, *, needs: str = "", otherwise: Any = None) -> Any:
@@ -125,7 +110,7 @@ class Entry:
 
     def __init__(self, function: Any) -> None:
         self._function = function
-        self._compiled: Callable[..., Any] | None = function if config.DISABLE_JIT else None
+        self._compiled: Callable[..., Any] | None = None
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the kernel."""
@@ -135,12 +120,9 @@ class Entry:
 
     def taking(self, *examples: Any) -> Callable[..., Any]:
         """Return the machine code's own Python function for arguments of these types."""
-        if config.DISABLE_JIT:
-            return self._function
-        kinds = self._function, tuple(_kind(example) for example in examples)
-        if kinds not in _CODES:
-            _CODES[kinds] = self._function.compile(kinds[1])
-        return _CODES[kinds]
+        made: Callable[..., Any] = (
+            self._function if config.DISABLE_JIT else self._function.compile(tuple(map(_kind, examples))))
+        return made
 
 
 @kernel
@@ -150,51 +132,31 @@ def copy_into(target, source):
         target[k] = source[k]
 
 
-class AbsentType(types.Boolean):
-    """Type of a flag that is off."""
-
-
-_ABSENT_TYPE = AbsentType("absent")
-
-
 class BlockType(types.Type):
     """Numba's type of a block: its fields, each with its type and its place (in words of 8 bytes); its absent flags."""
 
-    def __init__(self, name: str, fields: tuple[tuple[str, types.Type], ...]) -> None:
-        self.fields = fields
-        places, words = [], 0
-        for _, kind in fields:
-            places.append(words)
-            words += _words(kind)
-        self.places = tuple(places)
-        self.absent: frozenset[str] = frozenset(field for field, kind in fields if isinstance(kind, AbsentType)).union(
-            *(kind.absent for _, kind in fields if isinstance(kind, BlockType)))
-        super().__init__(f"{name}({', '.join(f'{field}: {kind}' for field, kind in fields)})")
-
-    def find(self, name: str) -> tuple[types.Type, int]:
-        """Type and place of a field."""
-        for (field, kind), place in zip(self.fields, self.places, strict=True):
-            if field == name:
-                return kind, place
-        raise AttributeError(name)
+    def __init__(self, name: str, fields: dict[str, types.Type]) -> None:
+        self.fields, kinds = fields, fields.values()
+        self.places = dict(zip(fields, accumulate(map(_words, kinds), initial=0), strict=False))
+        self.absent: frozenset[str] = frozenset(
+            name for name, kind in fields.items() if isinstance(kind, types.NoneType)).union(
+            *(kind.absent for kind in kinds if isinstance(kind, BlockType)))
+        super().__init__(f"{name}({', '.join(f'{field}: {kind}' for field, kind in fields.items())})")
 
 
 class Block:
-    """A NamedTuple of arrays, numbers and further such tuples, laid out in memory for kernels.
+    """A NamedTuple or dict of arrays, numbers and further such content, laid out in memory for kernels.
 
     The block refers to the arrays and keeps them alive. Numbers are copied and cannot change.
     """
 
-    block_type: BlockType
-    address: int  # of the layout in memory
-
     def __init__(self, content: Any) -> None:
-        members = [block(value) if _is_named_tuple(value) else value for value in content]
-        self._content = content._replace(**dict(zip(content._fields, members, strict=True)))
-        kinds = tuple(map(_kind, members))
-        self.block_type = _block_type_of(type(content).__name__, content._fields, kinds)
-        words = [word for member in members for word in _layout(member)]
-        self._memory = np.array(words, dtype=np.int64)
+        given = content if isinstance(content, dict) else content._asdict()
+        self._members = {name: block(value) if isinstance(value, dict) or hasattr(value, "_fields") else value
+                         for name, value in given.items()}
+        self._content = SimpleNamespace(**self._members) if given is content else content._replace(**self._members)
+        self.block_type = BlockType(type(content).__name__, {k: _kind(value) for k, value in self._members.items()})
+        self._memory = np.array([word for value in self._members.values() for word in _layout(value)], np.int64)
         self.address = self._memory.ctypes.data
 
     def __reduce__(self) -> Any:
@@ -203,8 +165,8 @@ class Block:
 
     def arrays(self) -> list[np.ndarray]:
         """Return all arrays, including those of nested blocks."""
-        nested = [member.arrays() for member in self._content if isinstance(member, Block)]
-        return [*(member for member in self._content if isinstance(member, np.ndarray)), *chain(*nested)]
+        found = [value for value in self._members.values() if isinstance(value, np.ndarray)]
+        return found + [each for value in self._members.values() if isinstance(value, Block) for each in value.arrays()]
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # as when unpickling
@@ -212,55 +174,23 @@ class Block:
         return getattr(self._content, name)
 
 
-_CODES: dict[Any, Callable[..., Any]] = {}  # kernel and types -> its machine code
-
-
-def columns(name: str, arrays: Mapping[str, Any]) -> Any:
-    """Return a NamedTuple of named arrays, for `block`."""
-    return _columns_of(name, tuple(arrays))(**arrays)
-
-
-@cache
-def _columns_of(name: str, fields: tuple[str, ...]) -> Any:
-    """Make the class once: only the garbage collector frees a class, and a live loop switches the collector off."""
-    return namedtuple(name, fields)
-
-
 def block(content: Any) -> Any:
-    """Lay a NamedTuple out for kernels; see the module's docstring."""
+    """Lay a NamedTuple or a dict out for kernels; see the module's docstring."""
     return content if isinstance(content, Block) else Block(content)
 
 
-def _is_named_tuple(value: Any) -> bool:
-    return isinstance(value, tuple) and hasattr(value, "_fields")
-
-
-# Cache of types: numba takes 20 µs to find the type of an array, and a simulation has hundreds.
-_KINDS: dict[Any, types.Type] = {}
-_NUMBERS = {bool: types.boolean, int: types.intp, float: types.float64}
-_BLOCK_TYPES: dict[Any, tuple[BlockType, tuple[types.Type, ...]]] = {}
+_KINDS: dict[Any, types.Type] = {}  # numba takes 20 µs to find the type of an array, and a simulation has hundreds
 
 
 def _kind(value: Any) -> types.Type:
-    if type(value) is np.ndarray:
-        known = value.dtype.str, value.ndim, value.flags.num
-        if known not in _KINDS:
-            _KINDS[known] = typeof(value)
-        return _KINDS[known]
     if isinstance(value, Block):
         return value.block_type
-    if type(value) in _NUMBERS:
-        return _NUMBERS[type(value)]
-    if value is ABSENT:
-        return _ABSENT_TYPE
-    return types.boolean if isinstance(value, np.bool_) else typeof(value)
-
-
-def _block_type_of(name: str, fields: tuple[str, ...], kinds: tuple[types.Type, ...]) -> BlockType:
-    known = name, fields, tuple(map(id, kinds))
-    if known not in _BLOCK_TYPES:  # the kinds are stored too, so that no other object gets their ids
-        _BLOCK_TYPES[known] = BlockType(name, tuple(zip(fields, kinds, strict=True))), kinds
-    return _BLOCK_TYPES[known][0]
+    if type(value) is not np.ndarray:
+        return typeof(value)
+    known = value.dtype.str, value.ndim, value.flags.num
+    if known not in _KINDS:
+        _KINDS[known] = typeof(value)
+    return _KINDS[known]
 
 
 def _words(kind: types.Type) -> int:
@@ -268,28 +198,13 @@ def _words(kind: types.Type) -> int:
     return 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
 
 
-def address_of(array: Any) -> int:
-    """Return the address of an array's first entry, four times faster than numpy does."""
-    try:
-        return ctypes.addressof(_NOTHING.from_buffer(array))
-    except (TypeError, ValueError, BufferError):  # read-only, or not in one piece
-        place: int = array.__array_interface__["data"][0]
-        return place
-
-
-_NOTHING = ctypes.c_char * 0
-
-
 def _layout(value: Any) -> list[int]:
     """Return a field as words. An array has no reference counter, for the block keeps it alive."""
     if isinstance(value, np.ndarray):
-        place = address_of(value)
-        return [0, 0, value.size, value.itemsize, place, *value.shape, *value.strides]
+        return [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
     if isinstance(value, Block):
         return [value.address]
-    if isinstance(value, float):
-        return list(struct.unpack("q", struct.pack("d", value)))
-    return [int(value)]
+    return [int(np.float64(value).view(np.int64)) if isinstance(value, float) else int(value or 0)]
 
 
 @register_model(BlockType)
@@ -317,16 +232,16 @@ class _BlockAttributes(AttributeTemplate):
     key = BlockType
 
     def generic_resolve(self, kind: BlockType, name: str) -> types.Type | None:
-        found = dict(kind.fields).get(name)
-        return types.boolean if isinstance(found, AbsentType) else found
+        found = kind.fields.get(name)
+        return types.boolean if isinstance(found, types.NoneType) else found
 
 
 @lower_getattr_generic(BlockType)
 def _read_field(context: Any, builder: Any, kind: BlockType, value: Any, name: str) -> Any:
     """Load a field: an array structure, a nested block's address, or a number."""
-    field, place = kind.find(name)
-    word = builder.gep(value, [ir.Constant(ir.IntType(64), place)], inbounds=True)
-    if isinstance(field, AbsentType):
+    field = kind.fields[name]
+    word = builder.gep(value, [ir.Constant(ir.IntType(64), kind.places[name])], inbounds=True)
+    if isinstance(field, types.NoneType):
         return context.get_constant(types.boolean, False)
     if isinstance(field, types.Boolean):
         result = builder.icmp_unsigned("!=", builder.load(word), ir.Constant(ir.IntType(64), 0))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -30,8 +29,8 @@ def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
             yield
     finally:
         _listening.pop()
-        if listener.seconds:
-            say(f"Compiling took {listener.seconds:.1f} s.")
+        if listener.done:
+            say(f"Compiling took {listener.duration:.1f} s.")
 
 
 def to_stderr(line: str) -> None:
@@ -54,22 +53,16 @@ def tell_from_worker(told: Any) -> None:
 
 
 def _listener(begin: Callable[[], None]) -> Any:
-    """Return a numba listener that calls begin() once and adds up the `seconds` of compiling."""
-    from numba.core import event
+    """Return a numba listener that calls begin() once and adds up the time of compiling, in `duration` once `done`."""
+    from numba.core.event import TimingListener
 
-    class Listener(event.Listener):
-        depth, started, seconds = 0, 0.0, 0.0
+    class Listener(TimingListener):
+        told = False
 
         def on_start(self, event: object) -> None:
-            if not self.started:
+            if not self.told:
+                self.told = True
                 begin()
-            self.depth += 1  # a kernel that calls another compiles it meanwhile
-            if self.depth == 1:
-                self.started = time.perf_counter()
-
-        def on_end(self, event: object) -> None:
-            self.depth -= 1
-            if not self.depth:
-                self.seconds += time.perf_counter() - self.started
+            super().on_start(event)
 
     return Listener()

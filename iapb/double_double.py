@@ -76,8 +76,8 @@ def quadratic_forms(mass_matrix, v, change, v_unit=1.0, change_unit=1.0):
 def unit_of(vector):
     """Return the power of two, at most 2^±1000, that scales the largest entry into [½, 1) or towards it."""
     largest = 0.0
-    for k in range(vector.shape[0]):
-        largest = max(largest, abs(vector[k]))
+    for entry in vector:
+        largest = max(largest, abs(entry))
     return math.ldexp(1.0, min(1000, max(-1000, -math.frexp(largest)[1])))
 
 

@@ -36,23 +36,15 @@ def _near_zero(h, l):
     """Return sine and cosine, as pairs, of an angle h + l of at most about 45 degrees."""
     z, w = two_product(h, h)
     w += 2.0 * h * l
-    tail = 1.0 / 121645100408832000.0
-    tail = 1.0 / 355687428096000.0 - z * tail
-    tail = 1.0 / 1307674368000.0 - z * tail
-    tail = 1.0 / 6227020800.0 - z * tail
-    tail = 1.0 / 39916800.0 - z * tail
-    tail = 1.0 / 362880.0 - z * tail
+    tail = 1.0 / 355687428096000.0 - z * (1.0 / 121645100408832000.0)  # 1/17! − z/19!
+    tail = 1.0 / 362880.0 - z * (1.0 / 39916800.0 - z * (1.0 / 6227020800.0 - z * (1.0 / 1307674368000.0 - z * tail)))
     s, t = add_product(-_SEVENTH[0], -_SEVENTH[1], z, w, tail)
     s, t = _multiply_add(_FIFTH[0], _FIFTH[1], z, w, s, t)
     s, t = _multiply_add(-_THIRD[0], -_THIRD[1], z, w, s, t)
     s, t = _multiply_add(0.0, 0.0, z, w, s, t)
     s, t = _multiply_add(h, l, s, t, h, l)
-    tail = 1.0 / 6402373705728000.0
-    tail = 1.0 / 20922789888000.0 - z * tail
-    tail = 1.0 / 87178291200.0 - z * tail
-    tail = 1.0 / 479001600.0 - z * tail
-    tail = 1.0 / 3628800.0 - z * tail
-    tail = 1.0 / 40320.0 - z * tail
+    tail = 1.0 / 20922789888000.0 - z * (1.0 / 6402373705728000.0)  # 1/16! − z/18!
+    tail = 1.0 / 40320.0 - z * (1.0 / 3628800.0 - z * (1.0 / 479001600.0 - z * (1.0 / 87178291200.0 - z * tail)))
     c, d = add_product(-_SIXTH[0], -_SIXTH[1], z, w, tail)
     c, d = _multiply_add(_FOURTH[0], _FOURTH[1], z, w, c, d)
     c, d = _multiply_add(-0.5, 0.0, z, w, c, d)

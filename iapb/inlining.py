@@ -25,30 +25,11 @@ from numba.core.typed_passes import NativeLowering
 _INLINE_UP_TO = 500
 
 
-class BitcodeLibrary(JITCodeLibrary):
-    """The library of a kernel that kernels call: its own bitcode, and the libraries that it needs."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        """Do not optimise: if a call were optimised away, a caller linked later would lack the callee."""
-        ll_module.data_layout = self._codegen._data_layout
-
-    def finalize(self) -> None:
-        """Do not link, optimise or generate machine code."""
-        self._finalized = True
-
-    @cached_property
-    def needed(self) -> list[Any]:
-        """This library and all libraries that it calls, each once; complete as soon as the library is finalised."""
-        found: dict[Any, None] = {self: None}
-        for library in self._linking_libraries:
-            found.update(dict.fromkeys(library.needed if isinstance(library, BitcodeLibrary) else [library]))
-        return list(found)
-
-
 class WholeLibrary(JITCodeLibrary):
     """The library of a kernel that Python calls, with all libraries that it needs."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
+        """Do not optimise: if a call were optimised away, a caller linked later would lack the callee."""
         ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
@@ -64,6 +45,22 @@ class WholeLibrary(JITCodeLibrary):
         tuning.loop_vectorization, tuning.inlining_threshold = True, _INLINE_UP_TO
         builder = llvm.create_pass_builder(self._codegen._tm, tuning)
         builder.getModulePassManager().run(self._final_module, builder)
+
+
+class BitcodeLibrary(WholeLibrary):
+    """The library of a kernel that kernels call: its own bitcode, and the libraries that it needs."""
+
+    def finalize(self) -> None:
+        """Do not link, optimise or generate machine code."""
+        self._finalized = True
+
+    @cached_property
+    def needed(self) -> list[Any]:
+        """This library and all libraries that it calls, each once; complete as soon as the library is finalised."""
+        found: dict[Any, None] = {self: None}
+        for library in self._linking_libraries:
+            found.update(dict.fromkeys(library.needed if isinstance(library, BitcodeLibrary) else [library]))
+        return list(found)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -97,10 +94,10 @@ class WholeLowering(NativeLowering):
         return bool(super().run_pass(state))
 
 
-class _Compiler(CompilerBase):
-    """Numba's passes with another lowering: one pipeline, no object mode, no parallel loops."""
+class WholeCompiler(CompilerBase):
+    """Compiler of a kernel that Python calls: numba's passes with another lowering, one pipeline, no object mode."""
 
-    lowering: type[NativeLowering]
+    lowering: type[NativeLowering] = WholeLowering
 
     def define_pipelines(self) -> list[Any]:
         """Replace numba's lowering."""
@@ -111,16 +108,10 @@ class _Compiler(CompilerBase):
         return [passes]
 
 
-class BitcodeCompiler(_Compiler):
+class BitcodeCompiler(WholeCompiler):
     """Compiler of a kernel that kernels call."""
 
     lowering = BitcodeLowering
-
-
-class WholeCompiler(_Compiler):
-    """Compiler of a kernel that Python calls."""
-
-    lowering = WholeLowering
 
 
 def compile_as_whole(function: Any, is_absent: Any = lambda kinds: False, otherwise: Any = None, **options: Any) -> Any:
@@ -141,16 +132,16 @@ def compile_as_whole(function: Any, is_absent: Any = lambda kinds: False, otherw
         return made
 
     parameters = ", ".join(inspect.signature(function).parameters)
-    inner, constant = bitcode_of(function), bitcode_of(eval(f"lambda {parameters}: {otherwise!r}"))
+    compiled.bitcode, constant = bitcode_of(function), bitcode_of(eval(f"lambda {parameters}: {otherwise!r}"))
 
     def version(arguments: Any) -> Any:
-        return constant if is_absent(arguments) else inner
+        return constant if is_absent(arguments) else compiled.bitcode
 
     def get_call_template(arguments: Any, keywords: Any) -> Any:
         """Use one version for all constant arguments: the optimiser sees the constants when it inlines."""
-        plain = tuple(types.unliteral(kind) for kind in arguments)
+        plain = tuple(map(types.unliteral, arguments))
         return version(plain).get_call_template(plain, keywords)
 
-    compiled.bitcode, compiled.get_call_template = inner, get_call_template
+    compiled.get_call_template = get_call_template
     compiled.get_overload = lambda arguments: version(arguments).get_overload(arguments)
     return compiled

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.advice.distrust import distrust_of
-from iapb.compiled import block, columns, copy_into, kernel
+from iapb.compiled import block, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
 from iapb.haptics.kernels import PLANNED
 from iapb.linalg import load, store
@@ -74,7 +74,7 @@ def make_record(steps: int, coordinates: Coordinates, contacts: int, trees: int)
     lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
     lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
     return block(Record(np.zeros(3, np.int64), **{
-        name: columns(f"{name}_lines", blank(listed, lengths, np.empty)) for name, listed in LINES.items()}))
+        name: blank(listed, lengths, np.empty) for name, listed in LINES.items()}))
 
 
 @kernel

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from iapb.advice.checks import settled
 from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, decide_for, facts_of
-from iapb.compiled import Entry, block, columns, flag
+from iapb.compiled import Entry, block, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.kernels.coulomb import RestWork
@@ -194,7 +194,7 @@ class System:
                                    tangent=rows * tangents * sliding, direction=tangents),
             rest_work=zeros_of(RestWork, velocity=d * soft, contact=c * soft, row=c * (1 + tangents) * soft,
                                width=2 * largest, direction=tangents, tree=trees),
-            impacts=columns("ImpactLog", {"logged": np.zeros(1, np.int64), **log}),
+            impacts={"logged": np.zeros(1, np.int64), **log},
         )
         state.q[:], state.v[:] = self.start
         state.mass_matrix[:] = mechanism.mass_matrix(state.q)

@@ -16,6 +16,7 @@ import numpy as np
 
 from iapb.compiled import flag, kernel
 from iapb.contact.geometry import ENDLESS, HALF_SPACE, POLYGON, Shapes
+from iapb.linalg import add, dot, load, store, subtract, transform
 from iapb.schema import Floats, Indices, Integers, States, blank, quantities
 
 # Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant pairs early.
@@ -79,33 +80,17 @@ LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cel
 @kernel(needs="used", otherwise=0)
 def near_pairs(broad, R, p, margin):
     """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do not fit."""
-    place_bounds(broad, R, p)
-    fill_buckets(broad, margin)
+    fill_buckets(broad, R, p, margin)
     count = moving_pairs(broad, margin)
     for i in broad.moving:
         for j in broad.static:
             count = keep_pair(broad, i, j, margin, count)
-    if count > 0:
-        sort_keys(broad.key, count)
-        shapes = broad.radius.shape[0]
-        for k in range(count):
-            i, j = broad.key[k] // shapes, broad.key[k] % shapes
-            first_is_a = broad.allowed[i, j] == 1
-            broad.pairs[k, 0] = i if first_is_a else j
-            broad.pairs[k, 1] = j if first_is_a else i
+    sort_keys(broad.key, count)
+    for k in range(count):
+        i, j = broad.key[k] // broad.radius.shape[0], broad.key[k] % broad.radius.shape[0]
+        first = 0 if broad.allowed[i, j] == 1 else 1
+        broad.pairs[k, first], broad.pairs[k, 1 - first] = i, j
     return count
-
-
-@kernel
-def place_bounds(broad, R, p):
-    """Write the centres of the bounding spheres of all moving shapes, in the world."""
-    for i in broad.moving:
-        body = broad.body[i]
-        for row in range(3):
-            total = p[body, row]
-            for k in range(3):
-                total += R[body, row, k] * broad.local_center[i, k]
-            broad.center[i, row] = total
 
 
 @kernel
@@ -115,22 +100,17 @@ def bucket_of(x, y, z, buckets):
 
 
 @kernel
-def cell_number(value, width):
-    """Return the cell of a coordinate; LARGEST_CELL if it is too large, infinite or not a number."""
-    number = math.floor(value / width)
-    return int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL
-
-
-@kernel
-def fill_buckets(broad, margin):
-    """Sort the moving shapes by the bucket of their cell (counting sort)."""
-    buckets = broad.start.shape[0] - 1
-    width = broad.cell_size + margin
+def fill_buckets(broad, R, p, margin):
+    """Place the bounding spheres of the moving shapes; sort them by the bucket of their cell (counting sort)."""
+    buckets, width = broad.start.shape[0] - 1, broad.cell_size + margin
     broad.start[:] = 0
     for m in range(broad.moving.shape[0]):
         i = broad.moving[m]
+        body = broad.body[i]
+        store(broad.center, i, add(load(p, body), transform(R, body, load(broad.local_center, i))))
         for axis in range(3):
-            broad.cell[m, axis] = cell_number(broad.center[i, axis], width)
+            number = math.floor(broad.center[i, axis] / width)  # may be infinite or not a number
+            broad.cell[m, axis] = int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL
         broad.bucket[m] = bucket_of(broad.cell[m, 0], broad.cell[m, 1], broad.cell[m, 2], buckets)
         broad.start[broad.bucket[m] + 1] += 1
     for k in range(buckets):
@@ -168,11 +148,8 @@ def keep_pair(broad, i, j, margin, count):
         i, j = j, i
     if broad.allowed[i, j] == 0:
         return count
-    reach, square = broad.radius[i] + broad.radius[j] + margin, 0.0
-    for axis in range(3):
-        apart = broad.center[i, axis] - broad.center[j, axis]
-        square += apart * apart
-    if square > reach * reach:
+    reach, apart = broad.radius[i] + broad.radius[j] + margin, subtract(load(broad.center, i), load(broad.center, j))
+    if dot(apart, apart) > reach * reach:
         return count
     if not 0 <= count < broad.key.shape[0]:
         return -1

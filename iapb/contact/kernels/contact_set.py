@@ -85,7 +85,10 @@ def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED
         contacts.is_new[i] = True
         for k in range(previous_count):
             j = begin + k if begin + k < previous_count else begin + k - previous_count
-            if previous.gap[j] < -TOUCHING and _is_same(contacts, i, previous, j, distance, cosine):
+            if previous.gap[j] < -TOUCHING and (_same_name(contacts, i, previous, j) or (
+                    distance > 0.0 and not is_stop(contacts, i) and not is_stop(previous, j)
+                    and same_surface(contacts, i, previous, j, cosine)
+                    and squared_distance(contacts, i, previous, j) <= distance * distance)):
                 contacts.is_new[i] = False
                 begin = j + 1 if j + 1 < previous_count else 0
                 break
@@ -96,16 +99,6 @@ def _same_name(first, i, second, j):
     """Return whether shapes and feature of two contacts are the same."""
     return (first.shape_a[i] == second.shape_a[j] and first.shape_b[i] == second.shape_b[j]
             and first.feature[i] == second.feature[j])
-
-
-@kernel
-def _is_same(contacts, i, previous, j, distance, cosine):
-    if _same_name(contacts, i, previous, j):
-        return True
-    if distance == 0.0 or is_stop(contacts, i) or is_stop(previous, j):
-        return False
-    return (same_surface(contacts, i, previous, j, cosine)
-            and squared_distance(contacts, i, previous, j) <= distance * distance)
 
 
 @kernel

@@ -174,22 +174,15 @@ def edge_frame(shapes, shape, edge):
 
 
 @kernel
-def opposed_edge(shapes, other, mx, my):
-    """Return the edge of `other` whose outward normal is most opposed to (mx, my), given in the frame of `other`."""
-    best, edge = math.inf, 0
-    for i in range(shapes.count[other]):
-        _, _, nx, ny, _ = edge_frame(shapes, other, i)
-        if nx * mx + ny * my < best:
-            best, edge = nx * mx + ny * my, i
-    return edge
-
-
-@kernel
 def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, margin, buffer, count):
     """Write the contacts over the reference edge, or between two corners if the polygons are closest there."""
     xx, xy, yx, yy, tx, ty = relative_frame(shapes, ref, other, R, p)
     ux, uy, nx, ny, length = edge_frame(shapes, ref, edge)
-    incident = opposed_edge(shapes, other, xx * nx + yx * ny, xy * nx + yy * ny)
+    mx, my, incident, opposed = xx * nx + yx * ny, xy * nx + yy * ny, 0, math.inf
+    for i in range(shapes.count[other]):  # the incident edge: its outward normal is most opposed to this one's
+        _, _, ox, oy, _ = edge_frame(shapes, other, i)
+        if ox * mx + oy * my < opposed:
+            incident, opposed = i, ox * mx + oy * my
     from_start = (xx, xy, yx, yy, tx - ux, ty - uy)
     s0, h0 = over_edge(shapes, other, incident, from_start, nx, ny)
     next_incident = following(shapes, other, incident)

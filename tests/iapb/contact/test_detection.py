@@ -1,4 +1,4 @@
-"""Contacts of shapes against the paper in numpy and against coal; bits that units, order and place must not change."""
+"""Contacts of shapes against plain geometry in numpy; bits that units, order and place must not change."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from iapb.contact.geometry import make_contact_buffer
+from iapb.contact.kernels.contact_set import ALIGNED_COSINE, cluster, mark_new
 from iapb.errors import IapbError
 from iapb.scene import Scene
 from iapb.simulation import simulate
@@ -229,39 +231,25 @@ def test_faces_of_two_cubes_never_share_a_name() -> None:
                 assert owners.setdefault(feature, owner)[1:] == owner[1:]
 
 
-# --- other code, and the whole of a run ------------------------------------------------------------------------------
+@pytest.mark.parametrize(("cosine", "old"), [(ALIGNED_COSINE, True), (0.0, False), (-1.0, False),
+                                             (np.nextafter(ALIGNED_COSINE, 0.0), False)])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_what_faces_as_a_neighbour_did_is_the_same_contact_and_nothing_else(
+    cosine: float, old: bool, swapped: bool
+) -> None:
+    """Two contacts on one place: of one surface up to the angle, and never of other bodies."""
+    both = make_contact_buffer(2)
+    both.normal[:], both.gap[:], both.feature[:] = [[1.0, 0.0, 0.0], [cosine, 0.0, 0.0]], -1.0, [0, 1]
+    both.shape_b[:] = 1
+    both.body_a[:], both.body_b[:] = ([0, 1], [1, 0]) if swapped else ([0, 0], [1, 1])
+    before, same = make_contact_buffer(1), old and not swapped
+    for field in both._fields:
+        getattr(before, field)[:] = getattr(both, field)[1:]
+    mark_new(both, 1, before, 1, 1.0)
+    assert both.is_new[0] != same and cluster(both, 2, 1.0) == (1 if same else 2)
 
 
-def coal_of(coal: Any, shape: Values) -> Any:
-    return coal.Sphere(shape["radius"]) if shape["kind"] == "sphere" else coal.Box(*shape["size"])
-
-
-@pytest.mark.parametrize("kinds", [("sphere", "sphere"), ("sphere", "box"), ("box", "sphere"), ("box", "box")])
-def test_depths_agree_with_coal_at_random_poses(kinds: tuple[str, str]) -> None:
-    """Of two boxes a face may be taken that is a twentieth deeper than the edges; coal iterates to about 1e-6."""
-    coal = pytest.importorskip("coal")
-    rng, touching = np.random.default_rng(1), 0
-    for seed in range(150):
-        shapes = [random_shape(rng, True, kind) | {"center": [0, 0, 0]} for kind in kinds]
-        for shape in shapes:
-            shape.pop("rpy", None)
-        system = pair_of(*shapes)
-        m = system.mechanism
-        q = m.integrate(m.neutral(), np.random.default_rng(seed).normal(size=12) * np.tile([0.25] * 3 + [1.5] * 3, 2))
-        R, p = m.placements(q)
-        result = coal.CollisionResult()
-        a, b = (coal_of(coal, shape) for shape in shapes)
-        coal.collide(a, coal.Transform3s(R[0], p[0]), b, coal.Transform3s(R[1], p[1]), coal.CollisionRequest(), result)
-        found = system.contacts_at(q)
-        true = result.getContact(0).penetration_depth if result.isCollision() else 0.0
-        if abs(true) < 1e-5:
-            continue
-        touching += 1
-        deepest = int(np.argmin(found.gap))
-        assert abs(true) - 2e-6 <= -found.gap[deepest] <= abs(true) * 1.12 + 2e-6
-        if -found.gap[deepest] < abs(true) + 1e-8:
-            np.testing.assert_allclose(found.normal[deepest], -np.array(result.getContact(0).normal), atol=1e-3)
-    assert touching > 50
+# --- the whole of a run ----------------------------------------------------------------------------------------------
 
 
 def test_many_shapes_are_found_without_asking_all_pairs() -> None:
