@@ -52,10 +52,10 @@ def needed(module: str, purpose: str) -> Any:
         return import_module(module)
     except ModuleNotFoundError as error:
         named = name_the_extra(error, purpose)
-        if named is not error:
-            raise named from error
-        package = module.partition(".")[0]
-        raise MissingDependencyError(package, purpose, f"pip install {package}") from error
+        if named is error:
+            package = module.partition(".")[0]
+            named = MissingDependencyError(package, purpose, f"pip install {package}")
+        raise named from error
 
 
 def hidden_package() -> str:
@@ -73,19 +73,14 @@ def hidden_package() -> str:
 
 def extension(group: str, name: str) -> Any:
     """Load the object that an installed package offers as an entry point; upper packages extend lower ones this way."""
-    for offered in entry_points(group=group, name=name):
-        return _loaded(offered, f"{group}: {name}")
+    for found in load_extensions(group, name=name):
+        return found
     raise MissingDependencyError("iapb[report]", f"{group}: {name}", "pip install 'iapb[report]'")
 
 
-def load_extensions(group: str) -> None:
-    """Import everything that installed packages offer in a group."""
-    for offered in entry_points(group=group):
-        _loaded(offered, group)
-
-
-def _loaded(offered: Any, purpose: str) -> Any:
+def load_extensions(group: str, **chosen: str) -> list[Any]:
+    """Import everything that installed packages offer in a group, or the entry point chosen by ``name=``."""
     try:
-        return offered.load()
+        return [offered.load() for offered in entry_points(group=group, **chosen)]
     except ModuleNotFoundError as error:
-        raise name_the_extra(error, purpose) from error
+        raise name_the_extra(error, ": ".join([group, *chosen.values()])) from error
