@@ -132,6 +132,9 @@ def copy_into(target, source):
         target[k] = source[k]
 
 
+OFF = typeof(None)  # type of a flag that is off
+
+
 class BlockType(types.Type):
     """Numba's type of a block: its fields, each with its type and its place (in words of 8 bytes); its absent flags."""
 
@@ -139,7 +142,7 @@ class BlockType(types.Type):
         self.fields, kinds = fields, fields.values()
         self.places = dict(zip(fields, accumulate(map(_words, kinds), initial=0), strict=False))
         self.absent: frozenset[str] = frozenset(
-            name for name, kind in fields.items() if isinstance(kind, types.NoneType)).union(
+            name for name, kind in fields.items() if kind is OFF).union(
             *(kind.absent for kind in kinds if isinstance(kind, BlockType)))
         super().__init__(f"{name}({', '.join(f'{field}: {kind}' for field, kind in fields.items())})")
 
@@ -233,7 +236,7 @@ class _BlockAttributes(AttributeTemplate):
 
     def generic_resolve(self, kind: BlockType, name: str) -> types.Type | None:
         found = kind.fields.get(name)
-        return types.boolean if isinstance(found, types.NoneType) else found
+        return types.boolean if found is OFF else found
 
 
 @lower_getattr_generic(BlockType)
@@ -241,7 +244,7 @@ def _read_field(context: Any, builder: Any, kind: BlockType, value: Any, name: s
     """Load a field: an array structure, a nested block's address, or a number."""
     field = kind.fields[name]
     word = builder.gep(value, [ir.Constant(ir.IntType(64), kind.places[name])], inbounds=True)
-    if isinstance(field, types.NoneType):
+    if field is OFF:
         return context.get_constant(types.boolean, False)
     if isinstance(field, types.Boolean):
         result = builder.icmp_unsigned("!=", builder.load(word), ir.Constant(ir.IntType(64), 0))

@@ -73,14 +73,15 @@ def hidden_package() -> str:
 
 def extension(group: str, name: str) -> Any:
     """Load the object that an installed package offers as an entry point; upper packages extend lower ones this way."""
-    for found in load_extensions(group, name=name):
+    for found in load_extensions(group, name):
         return found
     raise MissingDependencyError("iapb[report]", f"{group}: {name}", "pip install 'iapb[report]'")
 
 
-def load_extensions(group: str, **chosen: str) -> list[Any]:
-    """Import everything that installed packages offer in a group, or the entry point chosen by ``name=``."""
+def load_extensions(group: str, name: str = "") -> list[Any]:
+    """Import everything that installed packages offer in a group, or what they offer under a name."""
     try:
-        return [offered.load() for offered in entry_points(group=group, **chosen)]
+        offered = entry_points(group=group, name=name) if name else entry_points(group=group)
+        return [each.load() for each in offered]
     except ModuleNotFoundError as error:
-        raise name_the_extra(error, ": ".join([group, *chosen.values()])) from error
+        raise name_the_extra(error, f"{group}: {name}" if name else group) from error

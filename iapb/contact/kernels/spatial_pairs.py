@@ -221,9 +221,8 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, m
     (center, axes, half), (center_other, axes_other, half_other) = box, box_other
     apart = subtract(center_other, center)
     sign = 1.0 if dot(apart, axes[face]) >= 0.0 else -1.0
-    m = scale(sign, axes[face])
-    u, v = axes[(face + 1) % 3], axes[(face + 2) % 3]
-    hu, hv = half[(face + 1) % 3], half[(face + 2) % 3]
+    u, v, m = axes[(face + 1) % 3], axes[(face + 2) % 3], scale(sign, axes[face])
+    sides = (half[(face + 1) % 3], half[(face + 2) % 3])
     incident, opposed = 0, 0.0
     for k in range(3):
         if abs(dot(axes_other[k], m)) > abs(opposed):
@@ -232,60 +231,52 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, m
     k1, k2 = (incident + 1) % 3, (incident + 2) % 3
     middle = add(apart, scale(side * half_other[incident], axes_other[incident]))
     first, second = scale(half_other[k1], axes_other[k1]), scale(half_other[k2], axes_other[k2])
-    cx, cy, ch = dot(middle, u), dot(middle, v), dot(middle, m) - half[face]
-    ax, ay, ah = dot(first, u), dot(first, v), dot(first, m)
-    bx, by, bh = dot(second, u), dot(second, v), dot(second, m)
+    c = (dot(middle, u), dot(middle, v), dot(middle, m) - half[face])
+    e1, e2 = (dot(first, u), dot(first, v), dot(first, m)), (dot(second, u), dot(second, v), dot(second, m))
     faces = (2 * face + (1 if sign > 0.0 else 0)) * 6 + 2 * incident + (1 if side > 0.0 else 0)
-    origin, kind, start = add(center, scale(half[face], m)), 3 if ref_is_a else 4, count
-    deepest_x, deepest_y, deepest = 0.0, 0.0, 1e300
-    for number in range(24):
-        inside, x, y, h = _corner_of_overlap(number, cx, cy, ch, ax, ay, ah, bx, by, bh, hu, hv)
-        if number < 4 and h < deepest:
-            deepest_x, deepest_y, deepest = x, y, h
+    origin, kind, start, deepest = add(center, scale(half[face], m)), 3 if ref_is_a else 4, count, (0.0, 0.0, 1e300)
+    for number in range(25):
+        inside, corner = _corner_of_overlap(number, c, e1, e2, sides)
+        if number < 4 and corner[2] < deepest[2]:
+            deepest = corner
+        if number == 24:  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
+            inside, x, y = count == start, deepest[0], deepest[1]
+            corner = (min(max(x, -sides[0]), sides[0]), min(max(y, -sides[1]), sides[1]), separation)
+        x, y, h = corner
         if inside and h <= margin:
             point = add(add(origin, scale(0.5 * h, m)), add(scale(x, u), scale(y, v)))
             count = store_contact(shapes, other, ref, not ref_is_a, vertex_feature(kind, faces, number), point, m, h,
                                   buffer, count)
-    if count == start:  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
-        x, y = min(max(deepest_x, -hu), hu), min(max(deepest_y, -hv), hv)
-        point = add(add(origin, scale(0.5 * separation, m)), add(scale(x, u), scale(y, v)))
-        return store_contact(shapes, other, ref, not ref_is_a, vertex_feature(kind, faces, 24), point, m, separation,
-                             buffer, count)
     return keep_widest(buffer, start, count, m) if count - start > MOST_POINTS else count
 
 
 @kernel
-def _corner_of_overlap(number, cx, cy, ch, ax, ay, ah, bx, by, bh, hu, hv):
-    """Return candidate corner `number` of the overlap: (whether it is a corner, x, y, h).
+def _corner_of_overlap(number, c, e1, e2, sides):
+    """Return whether candidate `number` is a corner of the overlap, and its (x, y, h).
 
     0-3 incident corners in the rectangle (its border included), 4-7 reference corners strictly inside the
     parallelogram, 8-23 crossings strictly inside both edges. Faces that coincide thus give four points.
     """
     first, second = 1.0 - 2.0 * (number & 1), 1.0 - (number & 2)
     if number < 4:
-        x, y = cx + first * ax + second * bx, cy + first * ay + second * by
-        return abs(x) <= hu and abs(y) <= hv, x, y, ch + first * ah + second * bh
+        corner = add(add(c, scale(first, e1)), scale(second, e2))
+        return abs(corner[0]) <= sides[0] and abs(corner[1]) <= sides[1], corner
     if number < 8:
-        x, y = first * hu, second * hv
-        area = ax * by - ay * bx
+        x, y = first * sides[0], second * sides[1]
+        area = e1[0] * e2[1] - e1[1] * e2[0]
         if area == 0.0:
-            return False, x, y, 0.0
-        alpha = ((x - cx) * by - (y - cy) * bx) / area
-        beta = (ax * (y - cy) - ay * (x - cx)) / area
-        return abs(alpha) < 1.0 and abs(beta) < 1.0, x, y, ch + alpha * ah + beta * bh
-    if number & 4:  # the edge c + first·e1 + β e2, β in (-1, 1); else c + first·e2 + α e1
-        px, py, ph, ex, ey, eh = cx + first * ax, cy + first * ay, ch + first * ah, bx, by, bh
-    else:
-        px, py, ph, ex, ey, eh = cx + first * bx, cy + first * by, ch + first * bh, ax, ay, ah
-    if number & 8:  # with the side x = second·hu of the rectangle; else y = second·hv
-        if ex == 0.0:
-            return False, px, py, ph
-        t = (second * hu - px) / ex
-        return abs(t) < 1.0 and abs(py + t * ey) < hv, second * hu, py + t * ey, ph + t * eh
-    if ey == 0.0:
-        return False, px, py, ph
-    t = (second * hv - py) / ey
-    return abs(t) < 1.0 and abs(px + t * ex) < hu, px + t * ex, second * hv, ph + t * eh
+            return False, c
+        alpha = ((x - c[0]) * e2[1] - (y - c[1]) * e2[0]) / area
+        beta = (e1[0] * (y - c[1]) - e1[1] * (x - c[0])) / area
+        return abs(alpha) < 1.0 and abs(beta) < 1.0, (x, y, c[2] + alpha * e1[2] + beta * e2[2])
+    # the edge c + first·e1 + β e2, β in (-1, 1), or c + first·e2 + α e1
+    start, e = (add(c, scale(first, e1)), e2) if number & 4 else (add(c, scale(first, e2)), e1)
+    k = 0 if number & 8 else 1  # with the side x = ± sides[0] of the rectangle, or y = ± sides[1]
+    if e[k] == 0.0:
+        return False, c
+    t, along = (second * sides[k] - start[k]) / e[k], second * sides[k]
+    across, h = start[1 - k] + t * e[1 - k], start[2] + t * e[2]
+    return abs(t) < 1.0 and abs(across) < sides[1 - k], (along, across, h) if k == 0 else (across, along, h)
 
 
 @kernel
