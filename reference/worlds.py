@@ -31,9 +31,9 @@ from reference.time_stepping import RigidConstraints
 
 # to add a world, add a line here
 WORLDS |= {
-    "ideal": lambda _: World("ideal", RigidConstraints(), "four-channel"),
-    "CBuc": lambda _: World("CBuc", RigidConstraints(), "unilateral"),
-    "ideal-friction": lambda _: World("ideal-friction", RigidConstraints(friction="coulomb"), "four-channel"),
+    "ideal": lambda rendering: World("ideal", RigidConstraints(), "four-channel"),
+    "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
+    "ideal-friction": lambda rendering: World("ideal-friction", RigidConstraints(friction="coulomb"), "four-channel"),
 }
 
 
