@@ -153,9 +153,8 @@ def present_contacts(world, state, contacts):
 def move(world, state, applied):
     """Integrate (7) over Δt: forces at each stage, new velocity, new configuration."""
     copy_into(state.start_q, state.q)
-    copy_into(state.start_v, state.v)
     for k in range(state.v.shape[0]):
-        state.mean_v[k] = state.mean_acceleration[k] = 0.0
+        state.start_v[k], state.mean_v[k], state.mean_acceleration[k] = state.v[k], 0.0, 0.0
     for stage in range(world.stage_weight.shape[0]):
         weight, time = world.stage_weight[stage], world.dt * world.stage_fraction[stage]
         if stage > 0:  # with velocity and acceleration of the stage before
@@ -165,12 +164,13 @@ def move(world, state, applied):
             if not locate(world, state):
                 return NOT_POSITIVE_DEFINITE
         accelerate(world, state, applied, stage)
-        add_multiple(state.mean_v, weight, state.v)
-        add_multiple(state.mean_acceleration, weight, state.acceleration)
-        add_multiple(state.penalty_force, weight, state.stage_penalty)
-        add_multiple(state.friction_force, weight, state.stage_friction)
-    copy_into(state.v, state.start_v)
-    add_multiple(state.v, world.dt, state.mean_acceleration)
+        for k in range(state.v.shape[0]):
+            state.mean_v[k] += weight * state.v[k]
+            state.mean_acceleration[k] += weight * state.acceleration[k]
+            state.penalty_force[k] += weight * state.stage_penalty[k]
+            state.friction_force[k] += weight * state.stage_friction[k]
+    for k in range(state.v.shape[0]):
+        state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
     touches = world.switches.contacts and (world.coulomb or world.implicit)
     if (touches or world.switches.joint_damping) and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
