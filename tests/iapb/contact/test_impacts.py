@@ -269,14 +269,6 @@ def test_a_face_struck_at_three_points_keeps_its_tangential_speed() -> None:
         np.testing.assert_allclose(found.velocity, [*(3.0 * t + 0.5 * n), 0.0], atol=1e-14)
 
 
-def test_a_plastic_blow_to_the_straight_arm_takes_what_the_paper_says() -> None:
-    """Fig. 3 with slender rods: 7/3 J before; all of it lost at 0.5 m, 0.379845 J left at 0.7 m."""
-    M = np.array([[8 / 3, 5 / 6], [5 / 6, 1 / 3]])
-    for reach, left in ((0.5, 0.0), (0.7, 0.379845)):
-        found = resolve_impact(M, [[1.0 + reach, reach]], [-1.0, -1.0], 0.0)
-        assert 7 / 3 + found.energy_change == pytest.approx(left, abs=1e-6)
-
-
 # --- contacts that only push -----------------------------------------------------------------------------------------
 
 BAR_MASS, BAR_ROWS = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])

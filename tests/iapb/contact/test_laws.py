@@ -119,9 +119,8 @@ def test_friction_in_impacts_without_friction_changes_no_bit_and_is_the_scenes_c
     assert np.array_equal(simulate(scene, law).q, simulate(scene).q)
     assert ImpulseAugmented().within(BOX).friction_in_impacts is False  # forces: paper
     assert ImpulseAugmented().within(BOX.with_values({"contact.forces": "implicit"})).friction_in_impacts is True
-    names = {each.name for each in (ImpulseAugmented(), law, ImpulseAugmented(pushing=True), Penalty())}
     run = simulate(BOX, law, steps=5)
-    assert len(names) == 4 and run.law == law.name and run.law_settings["friction_in_impacts"] is True
+    assert run.law == law.name and run.law_settings["friction_in_impacts"] is True
 
 
 # --- energy over a run -----------------------------------------------------------------------------------------------
