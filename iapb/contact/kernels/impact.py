@@ -6,13 +6,12 @@ import math
 from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.passive import clamped_step, plainly_loses, write_step
+from iapb.contact.kernels.passive import UNIT, clamped_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import orthonormal_basis, projected_change
 from iapb.double_double import add_product, symmetric_entry
 from iapb.linalg import add_multiple, dot_of, from_whitened, to_momentum, to_whitened, whiten_columns
 from iapb.schema import Floats
 
-UNIT_ROUNDOFF = 2.0**-53
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. The error of
 # restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would violate restitution at real contacts
 # (the kit requires 1e-8); a smaller one would treat rounding of a Jacobian (1e-16, amplified by √κ(M)) as a contact.
@@ -48,7 +47,7 @@ def rank_tolerance(lower):
     for k in range(1, d):
         largest = max(largest, lower[k, k])
         smallest = min(smallest, lower[k, k])
-    return max(RANK_TOLERANCE, _NOISE_FACTOR * d * UNIT_ROUNDOFF * largest / smallest)
+    return max(RANK_TOLERANCE, _NOISE_FACTOR * d * UNIT * largest / smallest)
 
 
 @kernel
