@@ -46,28 +46,25 @@ class Document:
         SceneError
             The text is not YAML, has tags, or exceeds the bounds above.
         """
+        from ruamel.yaml import YAML
+        from ruamel.yaml.error import YAMLError
+
         self.file, self._what, self._count = file, what, 0
         self.mistakes: list[Mistake] = []
         self._keys: dict[Path, tuple[int, int]] = {}
         if len(text) > MAX_CHARACTERS:
             raise self._refusal((1, 1), f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters")
-        root = self._composed(text)
-        self._places: dict[Path, tuple[int, int]] = {(): (1, 1)} if root is None else {}
-        self.value = None if root is None else self._plain(root, ())
-
-    def _composed(self, text: str) -> Any:
-        from ruamel.yaml import YAML
-        from ruamel.yaml.error import YAMLError
-
         yaml = YAML(typ="safe", pure=True)
         yaml.composer.warn_double_anchors = False
         try:
-            return yaml.compose(text)
+            root = yaml.compose(text)
         except (YAMLError, ValueError, OverflowError, RecursionError) as failure:
             mark, problem = (getattr(failure, name, None) for name in ("problem_mark", "problem"))
             place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
             said = problem or " ".join(str(failure).split())
             raise self._refusal(place, "(not YAML)", f"valid YAML: {said}") from failure
+        self._places: dict[Path, tuple[int, int]] = {(): (1, 1)} if root is None else {}
+        self.value = None if root is None else self._plain(root, ())
 
     def _refusal(self, place: tuple[int, int], value: str, expected: str) -> SceneError:
         return SceneError([Mistake(self.file, *place, "(file)", value, expected)], self._what)

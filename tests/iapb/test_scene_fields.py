@@ -206,14 +206,6 @@ def test_a_limit_that_gives_way_is_said_before_and_after_the_run() -> None:
     assert any("motor.angle is -0.4" in why and "times their range" in why for why in simulate(scene).distrust)
 
 
-def test_a_limit_that_is_passed_for_a_while_is_said() -> None:
-    soft = swinging(**{"bodies.rod.joint_limits": [-0.1, 0.1], "contact.stiffness": 100.0, "duration": 0.4})
-    run = simulate(soft, Penalty())
-    assert run.q.max() == pytest.approx(0.3, abs=0.01) and abs(run.q[-1, 0]) < 0.1  # 2 rad/s over 10 1/s
-    assert any("rod.angle is" in why and "beyond its limits -0.1 and 0.1" in why for why in run.distrust)
-    assert not simulate(soft.with_values({"contact.stiffness": 4e4}), Penalty()).distrust
-
-
 def test_limits_that_are_not_reached_change_no_bit() -> None:
     scene = load_scene(find_scene("arm_obstacles"))
     names = [body.name for body in scene.bodies if body.joint == "revolute"]
@@ -261,17 +253,3 @@ def test_limits_hold_in_space_for_turning_and_sliding_joints(law: Any) -> None:
     assert np.array_equal(run.q, alone.q)  # rows of one body alone are not used at stops
     free = simulate(scene.with_values({f"bodies.{name}.joint_limits": None for name in ("mast", "boom", "slider")}))
     assert beyond(free, scene) > 0.5
-
-
-class Drifting:
-    """A law that says nothing of joints, and lets everything drift."""
-
-    name, settings = "drifting", {}
-
-    def advance(self, system: Any, state: Any, applied: Any, dt: float) -> Any:
-        raise AssertionError("only its name is asked for")
-
-
-def test_a_law_that_does_not_name_joints_is_said_to_ignore_them() -> None:
-    ignored = {e.name: e.ignores for e in Simulation(in_space(), Drifting()).effects if e.ignores}
-    assert ignored == {"joint_damping": "joint_damping", "joint_limits": "joint_limits"}

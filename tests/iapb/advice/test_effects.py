@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -79,6 +80,8 @@ RIGID, RUBBING = RigidConstraints(), "impulse-augmented penalty with impact fric
 ROUGH, BARE = PEG.with_values({"contact.friction": 0.3}), PEG.with_values({"couplings": {}})
 PER_BODY = ROUGH.with_values({"contact.self_collision_rows": "per_body"})
 GAINS = FourChannel((5.0, 6.0, 7.0), (1.0, 1.0, 1.0))
+DRIFTING = SimpleNamespace(name="drifting")  # a law that says nothing of joints
+JOINTED = PENDULUM.with_values({"bodies.upper.joint_damping": 0.25, "bodies.lower.joint_limits": [-3, 3]})
 SLIDER = [{"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1}]
 
 # effect, scene, law, coupling and rendering, whether it is on, what the reason says, field that the law ignores
@@ -89,6 +92,8 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
       for name, field in (("penalty_stiffness", "stiffness"), ("contact_damping", "damping"), ("friction", "friction"))
       for law, on in (("penalty", True), (RIGID, False))),
     ("friction", PEG.with_values({"contact.friction": 0.0}), (RIGID,), False, RIGID.name, ""),
+    *((name, JOINTED, (DRIFTING,), False, "'drifting' does not use it", name)
+      for name in ("joint_damping", "joint_limits")),
     ("impact_friction", ROUGH, (RUBBING,), True, "0.3", ""),
     ("impact_friction", ROUGH, ("impulse-augmented penalty",), False, "does not use it", ""),
     ("impact_friction", PER_BODY, (RUBBING,), False, "per_body", ""),
