@@ -26,7 +26,7 @@ from verification.hard_cases import study as hard_cases
 from verification.laws import study as laws
 from verification.proofs import check_all, on_proofs
 from verification.proofs.coq_development import Theorem, theorems
-from verification.proofs.statement import ProofRecord
+from verification.proofs.show import ProofRecord
 
 Progress = Callable[[str, int, int], None]
 Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise
@@ -34,7 +34,7 @@ Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress
 # study that draws random numbers -> module with its SEED
 SEEDS = {
     "claims": "verification.check", "properties": "verification.laws.study",
-    "proofs": "verification.proofs.statements.exact_instances", "robots": "verification.mechanics.against_pinocchio",
+    "proofs": "verification.proofs.numbers", "robots": "verification.mechanics.against_pinocchio",
     "power balance": "verification.mechanics.power_balance",
     "coordinates": "verification.mechanics.coordinate_invariance",
 }  # fmt: skip

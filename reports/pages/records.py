@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from verification.finding import Failure, Finding, Table
-from verification.proofs.statement import ProofRecord
+from verification.proofs.show import ProofRecord
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def test_what_a_stage_reads_beside_the_project_is_in_its_key(tmp_path, monkeypat
     assert len({Stage(tmp_path, "complementarity", int, {}, one).path for one in found}) == 3
     assert found[0]["problems"] == depends.ABSENT and "cvxpy" in found[0]
     assert depends.depends_of("properties") == {}
-    assert set(depends.depends_of("proofs")) == {"Coq", "coq"}  # its version, and the hash of the development
+    assert set(depends.depends_of("proofs")) == {"Coq", "coq", "statements"}  # a version, and hashes of texts
     assert set(depends.depends_of("engines")) >= {"mujoco", "drake"}
 
 

@@ -1,23 +1,19 @@
-"""Machine-checked proofs: one function per statement, listed in reading order.
+"""Machine-checked proofs: every statement is text in the folder `statements`, in the layout that `layout` describes.
 
     >>> from verification.proofs import all_proofs, check
     >>> for name in all_proofs():
     ...     record = check(name)
     ...     print(record.name, record.verdict)
 
-The function with the statement's name returns a `Statement`. To add a proof, write its function and add its name below.
+A small kernel reads the formulas (`words`), finds and checks certificates (`steps`) and exact cases (`cases`); SymPy
+reads the same text by itself (`by_sympy`). To add a proof, write its text; no code names it.
 """
 
 from __future__ import annotations
 
-import importlib
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from iapb.errors import ArgumentError
-from iapb.names import one_of
 from verification.finding import (
     NOT_COMPUTED,
     REFUTED,
@@ -31,58 +27,26 @@ from verification.finding import (
     of_each,
     table_of,
 )
-from verification.proofs.checking import checked
-from verification.proofs.coq_development import ARGUED, NO_ANSWER, NOT_RUN, Theorem, says
-from verification.proofs.second_tool import CERTIFIED, second_opinion
-from verification.proofs.statement import NO, NOT_APPLICABLE, YES
-
-if TYPE_CHECKING:
-    from verification.proofs.statement import ProofRecord, Statement
-
-# Modules and their statements, in reading order.
-_STATEMENTS = {
-    "theorems": ("theorem_1", "theorem_2", "impulse_of_independent_rows", "dynamically_consistent_inverse",
-                 "newton_law_solvable"),
-    "redundant_rows": ("one_inverse_invariance", "independent_subset", "step_37", "reverse_order_law",
-                       "delassus_definite"),
-    "consequences": ("single_contact_complementarity", "coordinate_invariance", "scaled_impulse",
-                     "loss_without_stiffness"),
-    "resting_contact": ("resting_contact", "resting_energy"),
-    "resolver": ("projector_form", "spectral_filter", "damped_impact", "any_truncation", "energy_clamp"),
-    "impact_laws": ("unequal_restitution", "newton_lcp", "newton_lcp_equal", "poisson_two_lcps", "momentum",
-                    "impact_friction", "islands"),
-    "errata": ("erratum_half", "erratum_symmetric", "erratum_hypothesis", "erratum_rank", "erratum_shape",
-               "erratum_friction_sign", "erratum_self_collision", "erratum_adhesion", "erratum_spreading",
-               "erratum_saturation"),
-    "floating_point": ("fp_projector", "fp_cholesky", "fp_clamp", "fp_rounding", "fp_promise", "fp_gram_pinv"),
-    "exact_instances": ("exact_instances",),
-}  # fmt: skip
-_HOME = {name: module for module, names in _STATEMENTS.items() for name in names}
+from verification.proofs import layout
+from verification.proofs.coq_development import ARGUED, NO_ANSWER, Theorem, says, statements
+from verification.proofs.prove import checked
+from verification.proofs.show import NO, NOT_APPLICABLE, YES, ProofRecord
 
 
 def all_proofs() -> tuple[str, ...]:
-    """Return the names of all statements, in reading order, without importing or checking them."""
-    return tuple(_HOME)
-
-
-def load(name: str) -> Statement:
-    """Return the statement of this name without checking it."""
-    if name not in _HOME:
-        raise ArgumentError("name", name, one_of(name, _HOME))
-    module = importlib.import_module(f"verification.proofs.statements.{_HOME[name]}")
-    return replace(getattr(module, name)(), name=name)
+    """Return the names of all statements, in reading order, without checking them."""
+    return layout.all_names()
 
 
 def check(name: str) -> ProofRecord:
-    """Build and check one statement.
+    """Check one statement.
 
     Raises
     ------
     ArgumentError
         If there is no statement of this name.
     """
-    started = time.perf_counter()
-    return checked(load(name), started)
+    return checked(layout.block(name))
 
 
 def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[ProofRecord, ...]:
@@ -91,12 +55,9 @@ def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> 
 
 
 def _check_with_coq(name: str) -> ProofRecord:
-    """Return the record, with Coq's answer for the theorems in CERTIFIED."""
-    record = check(name)
-    if name not in CERTIFIED:
-        return record
-    opinion = second_opinion(load(name))
-    return replace(record, coq=NOT_RUN if opinion.verdict == "skipped" else opinion.answer)
+    """Return the record, with Coq's answer for the statements of `Theorems.v`."""
+    theorem = statements().get(name)
+    return replace(check(name), coq=theorem.coq if theorem else NOT_APPLICABLE)
 
 
 def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),

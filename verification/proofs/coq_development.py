@@ -1,8 +1,9 @@
 """The Coq development in `verification/proofs/coq`: its compilation, its assumptions, and the extracted checker.
 
 `Checker.v` verifies an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file that
-`iapb certify --export` writes. `Passive.v` proves with Flocq the basis of the last step of the resolver. If coqc, Flocq
-or OCaml is missing, the result names the missing program and claims nothing.
+`iapb certify --export` writes. `Passive.v` proves with Flocq the basis of the last step of the resolver. `Theorems.v`
+states Theorems 1 and 2 and (33) by hand. If coqc, Flocq or OCaml is missing, the result names the missing program and
+claims nothing.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from iapb.errors import IapbError, MissingDependencyError
 from verification.finding import Failure, counted, of_each
-from verification.proofs.statement import YES
+from verification.proofs.show import YES
 
 FOLDER = Path(__file__).with_name("coq")
 PATIENCE = 600.0  # seconds for one file
@@ -27,6 +29,7 @@ PATIENCE = 600.0  # seconds for one file
 KNOWN_AXIOMS = frozenset({
     "ClassicalDedekindReals.sig_forall_dec", "ClassicalDedekindReals.sig_not_dec",
     "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
+STATEMENTS = "Theorems"  # the file with theorems that are also statements of the kernel, by the same names
 NOT_RUN, NO_ANSWER = "not run here", "no answer"
 SAYS = {
     "check_sound": "if the exact checker accepts, wᵀMw ≤ vᵀMv over the real numbers",
@@ -80,9 +83,15 @@ class Theorem:
 
 def theorems(progress: Callable[[int, int], None] = lambda done, total: None,
              failures: list[Failure] | None = None) -> tuple[Theorem, ...]:  # fmt: skip
-    """Return every theorem of the development, with Coq's answer, or "not run here" if Coq is not installed."""
-    files = sorted(path.stem for path in FOLDER.glob("*.v"))
+    """Return every theorem about the code, with Coq's answer, or "not run here" if Coq is not installed."""
+    files = sorted(path.stem for path in FOLDER.glob("*.v") if path.stem != STATEMENTS)
     return tuple(of_each(counted(files, progress), _answered, failures))
+
+
+@cache
+def statements() -> dict[str, Theorem]:
+    """Return the statements that Coq proves too, by name, with its answer."""
+    return {theorem.name: theorem for theorem in _answered(STATEMENTS)}
 
 
 def _answered(name: str) -> tuple[Theorem, ...]:
@@ -193,3 +202,4 @@ def _assumptions(said: str) -> list[frozenset[str]]:
         elif line and not line[0].isspace() and found:
             found[-1].add(line.split(":")[0].strip())
     return [frozenset(one) for one in found]
+

@@ -1,137 +1,78 @@
-"""Records of statements to prove and of the results of checking them."""
+"""A statement as the kernel reads it from its text: facts, steps to check, and exact cases."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from verification.proofs.algebra import Equation, Fact
-from verification.proofs.exact import Instance
-from verification.proofs.printing import proof_text
-from verification.proofs.steps import Exact, Step
+from verification.proofs.cases import Case, completed, read_case
+from verification.proofs.layout import Block, Entry
+from verification.proofs.steps import Cofactor, Factors, Refused
+from verification.proofs.words import Expression, Fact, Reader, letter, product
+
+_INFERENCES = {"cancelling": "cancel", "dividing": "divide", "dominating": "dominate"}
 
 
-@dataclass(frozen=True)
-class Without:
-    """An exact case that shows the need for a hypothesis: it fails, all others hold, and a conclusion is false.
+@dataclass
+class Task:
+    """A step as its text gives it: the claim, and by what it follows."""
 
-    Several names are dropped together if they state one property (such as both sides of an inverse).
-    """
-
-    hypothesis: str | tuple[str, ...]
-    instance: Instance
-    note: str = ""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return (self.hypothesis,) if isinstance(self.hypothesis, str) else self.hypothesis
+    claim: Fact
+    entry: Entry
+    method: str = ""
+    terms: list[Factors] = field(default_factory=list)
+    cofactors: list[Cofactor] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class Twin:
-    """A deliberately altered statement that is false: `claim` fails on `instance`, which satisfies all hypotheses.
-
-    A claim about numbers (`Exact`) needs no instance, because it is false by itself.
-    """
-
-    title: str
-    claim: Fact | Exact
-    instance: Instance = Instance({})
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class Statement:
-    """A theorem, lemma or erratum with its proof.
+    """A statement as the kernel reads it.
 
-    `definitions` give names to expressions (a letter or scalar on the left); they assume nothing, so they need no
-    counterexample. `statement` and `remarks` are prose with LaTeX between dollar signs. `concludes` names the steps
-    that are conclusions; the other steps are lemmas. `witness` is one exact case that satisfies every hypothesis, so
-    the theorem is not vacuous. A floating-point statement lists its premises separately: `assumed` about rounding,
-    `measured` on the compiled code. `load` sets `name`.
+    `given` holds the facts of each hypothesis, `definitions` name expressions and assume nothing, `tasks` are the
+    steps. `cases` are exact values; the one named "" satisfies every hypothesis, so the theorem is not vacuous.
     """
 
-    title: str
-    source: str
-    statement: str
-    given: tuple[Fact, ...] = ()
-    definitions: tuple[Equation, ...] = ()
-    steps: Sequence[Step] = ()
-    concludes: tuple[str, ...] = ()
-    witness: Instance | None = None
-    needed: tuple[Without, ...] = ()
-    twins: tuple[Twin, ...] = ()
-    remarks: tuple[str, ...] = ()
-    assumed: tuple[str, ...] = ()
-    measured: tuple[str, ...] = ()
-    name: str = ""
+    def __init__(self, block: Block) -> None:
+        self.block = block
+        names = {name: letter(name, *shape) for name, shape in block.shapes.items()}
+        for name, formula in block.abbreviations:
+            names[name] = Reader(names).expression(formula)
+        self.names, self.reader = names, Reader(names)
+        self.hypotheses = [(entry, self._facts(entry)) for entry in block.all("given")]
+        self.given = [fact for _, facts in self.hypotheses for fact in facts]
+        self.definitions = [fact for entry in block.all("where") for fact in self._facts(entry)]
+        self.tasks: list[Task] = []
+        for entry in block.all("lemma", "show", "sum", "by"):
+            self._read_step(entry)
+        self.conclusions = [task.claim for task in self.tasks if task.entry.key == "show"]
+        self.cases: dict[str, Case] = {}
+        for entry in block.all("case"):
+            name, colon, values = entry.formula.rpartition(":")
+            self.cases[name] = read_case(values, block.shapes)
 
-    @property
-    def conclusions(self) -> tuple[Fact, ...]:
-        return tuple(s.claim for s in self.steps if s.claim is not None and s.claim.name in self.concludes)
+    def case(self, text: str) -> Case:
+        """Return the values of a case, with those of the definitions."""
+        name, _, values = text.rpartition(":")
+        return completed(read_case(values, self.block.shapes, self.cases.get(name, {})), self.definitions)
 
+    def _facts(self, entry: Entry) -> list[Fact]:
+        return [self.reader.fact(each, entry.words) for each in entry.formula.split(";")]
 
-YES, NO, NOT_APPLICABLE = "yes", "no", "not applicable"
-
-
-@dataclass(frozen=True)
-class Line:
-    """One line of a printed proof: its words and, if there is one, its formula as text and as LaTeX."""
-
-    words: str
-    text: str = ""
-    latex: str = ""
-
-
-@dataclass(frozen=True)
-class StepRecord:
-    """A checked step: claim, reason, certificate term by term, and whether the check accepted it."""
-
-    claim: Line
-    because: str
-    certificate: tuple[Line, ...]
-    accepted: bool
-    refusal: str = ""
+    def _read_step(self, entry: Entry) -> None:
+        if entry.key in ("lemma", "show"):
+            self.tasks.append(Task(self.reader.fact(entry.formula, entry.words), entry))
+        elif entry.formula in _INFERENCES:
+            self.tasks[-1].method = _INFERENCES[entry.formula]
+        elif entry.key == "by":
+            self.tasks[-1].cofactors += map(_cofactor, self.reader.products(entry.formula))
+        else:
+            terms = self.reader.products(entry.formula)
+            self.tasks[-1].terms += [tuple(x for x in term if isinstance(x, Expression)) for term in terms]
 
 
-@dataclass(frozen=True)
-class Refutation:
-    """A false statement, an exact case, and whether the case refutes the statement."""
-
-    title: str
-    claim: Line
-    case: tuple[Line, ...]
-    note: str
-    refuted: bool
-
-
-@dataclass(frozen=True)
-class ProofRecord:
-    """A proof as plain data, with everything that the command line and the report show."""
-
-    name: str
-    title: str
-    source: str
-    statement: str
-    hypotheses: tuple[Line, ...]
-    definitions: tuple[Line, ...]
-    steps: tuple[StepRecord, ...]
-    conclusions: tuple[Line, ...]
-    needed: tuple[Refutation, ...]
-    twins: tuple[Refutation, ...]
-    remarks: tuple[str, ...]
-    assumed: tuple[str, ...]
-    measured: tuple[str, ...]
-    verdict: str
-    problems: tuple[str, ...]
-    seconds: float = field(compare=False)
-    sympy: str = NOT_APPLICABLE  # whether SymPy and Coq expand the certificates too: YES, NO, or why there is no answer
-    coq: str = NOT_APPLICABLE
-
-    @property
-    def holds(self) -> bool:
-        return self.verdict == "proved"
-
-    def as_text(self) -> str:
-        """Return the whole proof as plain text, readable without the code."""
-        return proof_text(self)
+def _cofactor(factors: tuple[Expression | Fact, ...]) -> Cofactor:
+    at = [i for i, each in enumerate(factors) if isinstance(each, Fact)]
+    fact = factors[at[0]] if len(at) == 1 else None
+    if not isinstance(fact, Fact):
+        raise Refused("a cofactor has one equation in square brackets")
+    left, right = (product(x for x in part if isinstance(x, Expression)) for part in (factors[: at[0]],
+                                                                                  factors[at[0] + 1 :]))
+    return left, fact, right

@@ -1,350 +1,250 @@
-"""The permitted proof steps. Expansion or exact arithmetic checks each step.
+"""The permitted proof steps. The kernel searches a certificate by rewriting, then checks it by expansion alone.
 
-Identity      claim.lhs - claim.rhs = sum of  left * (equation.lhs - equation.rhs) * right   (cofactor certificate)
-Positivity    claim.value = sum of non-negative terms + cofactors                            (sum of squares)
-Cancelling    N' G N = 0 (or <= 0) with G positive definite, hence N = 0
-Dominating    q x >= x² with q >= 0, hence x >= 0
-Exact         a relation between two rational numbers
-
-A step raises `Refused` if its certificate does not expand to zero, or if it uses a fact that is not established yet.
+sum        claim.lhs − claim.rhs = sum of non-negative terms + sum of  left * (equation.lhs − equation.rhs) * right;
+           an equation has no such terms
+cancel     N = 0, since N' X N = 0 (or ≤ 0) with X positive definite (or without an X)
+divide     N = 0, since s N = 0 and the scalar s is not 0
+dominate   x ≥ 0, since q x − x² ≥ 0 and q ≥ 0 (scalars)
 """
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import reduce
 
 from iapb.errors import IapbError
-from verification.proofs.algebra import (
-    Definite,
-    Entrywise,
-    Equation,
+from verification.proofs.words import (
+    ANY,
+    ONE,
     Expression,
     Fact,
-    NonNegative,
-    Nonzero,
-    Operand,
     Scalars,
     Word,
-    expression,
+    number,
+    of_word,
+    product,
     transposed,
-    word_expression,
 )
 
-RELATIONS = {"=": operator.eq, "≠": operator.ne, "<": operator.lt, "≤": operator.le, ">": operator.gt, "≥": operator.ge}
+MOST_REPLACEMENTS = 2000  # a proof needs some dozens; beyond this limit the rules run in a circle
+Cofactor = tuple[Expression, Fact, Expression]
+Factors = tuple[Expression, ...]
 
 
 class Refused(IapbError):
-    """Error: a step does not follow from its certificate."""
+    """Error: a step does not follow."""
 
 
 @dataclass(frozen=True)
-class Cofactor:
-    """One term  left * (equation.lhs - equation.rhs) * right  of a certificate; the equation makes it zero."""
+class Step:
+    """A claim and its certificate: non-negative terms (each the factors of a product), and cofactors, which are zero;
+    for `cancel`, `divide` and `dominate` the two facts that it follows from."""
 
-    left: Expression
-    equation: Equation
-    right: Expression
-
-    @property
-    def value(self) -> Expression:
-        return self.left * self.equation.difference * self.right
-
-
-@dataclass(frozen=True)
-class Square:
-    """half' core half, which is non-negative if the core is (without a core: the identity)."""
-
-    half: Expression
-    core: Definite | NonNegative | None = None
-
-    @property
-    def value(self) -> Expression:
-        core = expression(1) if self.core is None else self.core.value
-        return self.half.T * core * self.half
-
-    @property
-    def facts(self) -> tuple[Fact, ...]:
-        return () if self.core is None else (self.core,)
+    claim: Fact
+    because: str = ""
+    terms: tuple[Factors, ...] = ()
+    cofactors: tuple[Cofactor, ...] = ()
+    sources: tuple[Fact, ...] = ()
 
 
-@dataclass(frozen=True)
-class Pairing:
-    """left' core right, which is non-negative if all three are so entrywise (without a core: the identity)."""
-
-    left: Entrywise
-    right: Entrywise
-    core: Entrywise | None = None
-
-    @property
-    def value(self) -> Expression:
-        core = expression(1) if self.core is None else self.core.value
-        return self.left.value.T * core * self.right.value
-
-    @property
-    def facts(self) -> tuple[Fact, ...]:
-        return (self.left, self.right) + (() if self.core is None else (self.core,))
-
-
-@dataclass(frozen=True)
-class Term:
-    """weight * (product of non-negative scalars) * form; the weight is a positive rational."""
-
-    weight: Fraction | int
-    factors: tuple[NonNegative, ...] = ()
-    form: Square | Pairing | NonNegative | None = None
-
-    @property
-    def value(self) -> Expression:
-        product = expression(self.weight)
-        for factor in self.factors:
-            product = product * factor.value
-        return product if self.form is None else product * self.form.value
-
-    @property
-    def facts(self) -> tuple[Fact, ...]:
-        if isinstance(self.form, NonNegative):
-            return (*self.factors, self.form)
-        return self.factors if self.form is None else self.factors + self.form.facts
-
-
+@dataclass
 class Known:
     """The facts that a proof may use so far, and the names of those that it has used."""
 
-    def __init__(self, facts: Iterable[Fact]) -> None:
-        self._facts = list(facts)
-        self.used: set[str] = set()
+    facts: list[Fact]
+    used: set[str] = field(default_factory=set)
 
-    def add(self, fact: Fact) -> None:
-        self._facts.append(fact)
-
-    def require(self, wanted: Fact) -> None:
-        """Mark `wanted` as used; raise Refused unless it or its transpose is established."""
-        for fact in self._facts:
-            if fact == wanted or (isinstance(fact, Equation) and fact.T == wanted):
+    def equation(self, wanted: Fact) -> Fact:
+        """Return the established equation that is `wanted` or its transpose."""
+        for fact in self.facts:
+            if fact.relation == "=" and wanted.difference in (fact.difference, fact.T.difference):
                 self.used.add(fact.name)
-                return
+                return fact if fact.difference == wanted.difference else fact.T
         raise Refused(f"the step uses '{wanted.name}', which no earlier step proves")
 
+    def about(self, value: Expression, relations: str, *, entrywise: bool = False) -> Fact | None:
+        return next((fact for fact in self.facts if fact.relation in relations and fact.difference == value
+                     and fact.entrywise is entrywise), None)  # fmt: skip
 
-@dataclass(frozen=True)
-class Identity:
-    """An equation that follows from others by a cofactor certificate."""
-
-    claim: Equation
-    cofactors: tuple[Cofactor, ...] = ()
-    because: str = ""
-
-    def verify(self, known: Known) -> None:
-        """Expand claim - sum of cofactors in the free algebra; raise Refused if the result is not zero."""
-        for cofactor in self.cofactors:
-            known.require(cofactor.equation)
-        _require_zero(self.claim.name, self.claim.difference, self.cofactors)
+    def rules(self, apart: Iterable[Fact]) -> list[Fact]:
+        """Return the equations, and their transposes, that replace a word by smaller or earlier ones, long words first;
+        those `apart` and their transposes are left out."""
+        used = {value for fact in apart for value in (fact.difference, fact.T.difference)}
+        both = [rule for fact in self.facts if fact.relation == "=" and fact.difference not in used
+                for rule in (fact, fact.T)]  # fmt: skip
+        return sorted(filter(_is_rule, both), key=lambda rule: -max(len(word) for _, word in rule.lhs.terms))
 
 
-@dataclass(frozen=True)
-class Positivity:
-    """value >= 0, because it is a sum of non-negative terms and of cofactors, which are zero."""
+def prove(claim: Fact, known: Known, terms: Sequence[Factors] = (), cofactors: Sequence[Cofactor] = (),
+          because: str = "") -> Step:  # fmt: skip
+    """Return the step whose certificate has these terms and cofactors; rewriting by the other equations finds the rest.
 
-    claim: NonNegative
-    terms: tuple[Term, ...]
-    cofactors: tuple[Cofactor, ...] = ()
-    because: str = ""
-
-    def verify(self, known: Known) -> None:
-        """Check that every term is non-negative, and that the terms and cofactors add up to the claim."""
-        remainder = self.claim.value
-        for term in self.terms:
-            if term.weight <= 0:
-                raise Refused(f"'{self.claim.name}': the weight {term.weight} is not positive")
-            if any(factor.value.rows != "*" for factor in term.factors):
-                raise Refused(f"'{self.claim.name}': a factor that is not a commuting scalar")
-            if isinstance(term.form, Pairing) and not term.form.value.is_scalar:
-                raise Refused(f"'{self.claim.name}': entrywise products only prove that a scalar is not negative")
-            for fact in term.facts:
-                known.require(fact)
-            remainder = remainder - term.value
-        for cofactor in self.cofactors:
-            known.require(cofactor.equation)
-        _require_zero(self.claim.name, remainder, self.cofactors)
-
-
-@dataclass(frozen=True)
-class Cancelling:
-    """N = 0, because N' G N = 0 or -N' G N >= 0 with G positive definite (without a G: the identity)."""
-
-    claim: Equation
-    square: Equation | NonNegative
-    definite: Definite | None = None
-    because: str = "a positive definite form vanishes only at zero"
-
-    def verify(self, known: Known) -> None:
-        known.require(self.square)
-        if self.definite is not None:
-            known.require(self.definite)
-        form = Square(self.claim.difference, self.definite).value
-        value = self.square.difference if isinstance(self.square, Equation) else -self.square.value
-        if not (form - value).vanishes():
-            raise Refused(f"'{self.claim.name}': the square does not match")
-
-
-@dataclass(frozen=True)
-class Dividing:
-    """N = 0, because s N = 0 and the scalar s is not zero."""
-
-    claim: Equation
-    product: Equation
-    divisor: Nonzero
-    because: str = "a non-zero scalar may be divided out"
-
-    def verify(self, known: Known) -> None:
-        known.require(self.product)
-        known.require(self.divisor)
-        if not (self.divisor.value * self.claim.difference - self.product.difference).vanishes():
-            raise Refused(f"'{self.claim.name}': the product does not match")
-
-
-@dataclass(frozen=True)
-class Dominating:
-    """x >= 0, because q x - x² >= 0 with q >= 0 (all scalars)."""
-
-    claim: NonNegative
-    factor: NonNegative
-    product: NonNegative
-    because: str = "x < 0 would make q x ≤ 0 < x²"
-
-    def verify(self, known: Known) -> None:
-        known.require(self.factor)
-        known.require(self.product)
-        q, x = self.factor.value, self.claim.value
-        if not (q.rows == x.rows == "*" and (q * x - x * x - self.product.value).vanishes()):
-            raise Refused(f"'{self.claim.name}': the product does not match")
-
-
-@dataclass(frozen=True)
-class Exact:
-    """A relation between two computed rationals; `says` describes the comparison."""
-
-    says: str
-    left: Fraction
-    relation: str
-    right: Fraction
-    claim: None = field(default=None, init=False)
-    because: str = ""
-
-    @property
-    def is_true(self) -> bool:
-        return bool(RELATIONS[self.relation](self.left, self.right))
-
-    def verify(self, known: Known) -> None:
-        del known
-        if not self.is_true:
-            raise Refused(f"'{self.says}': {self.left} {self.relation} {self.right} is false")
-
-
-Step = Identity | Positivity | Cancelling | Dividing | Dominating | Exact
-
-
-def _require_zero(name: str, value: Expression, cofactors: Iterable[Cofactor]) -> None:
-    for cofactor in cofactors:
-        value = value - cofactor.value
-    if not value.vanishes():
-        raise Refused(f"'{name}': {len(value.canonical().terms)} terms remain after the certificate is expanded")
-
-
-MOST_REPLACEMENTS = 2000  # a proof needs some dozens; beyond this limit the rules run in a circle
-
-
-def rewritten(value: Expression, rules: Sequence[Equation]) -> tuple[Expression, tuple[Cofactor, ...]]:
-    """Apply the rules until none matches; return rest and cofactors with value = rest + sum of cofactors."""
-    cofactors: list[Cofactor] = []
-    for _ in range(MOST_REPLACEMENTS):
-        cofactor = _first_match(value, rules)
-        if cofactor is None:
-            return value, tuple(cofactors)
-        cofactors.append(cofactor)
-        value = value - cofactor.value
-    raise Refused(f"the rewriting rules form a cycle: more than {MOST_REPLACEMENTS} replacements")
-
-
-def identity(
-    name: str,
-    lhs: Operand,
-    rhs: Operand,
-    rules: Sequence[Equation] = (),
-    because: str = "",
-    first: Sequence[Cofactor] = (),
-) -> Identity:
-    """Return the step lhs = rhs: subtract the cofactors `first`, given by hand, then rewrite the rest by `rules`."""
-    claim = Equation(name, expression(lhs), expression(rhs))
-    remainder = claim.difference
-    for cofactor in first:
-        remainder = remainder - cofactor.value
-    rest, cofactors = _reduced(remainder, rules)
-    if not rest.vanishes():
-        raise Refused(f"'{name}': {len(rest.canonical().terms)} terms remain after rewriting")
-    return Identity(claim, (*first, *cofactors), because)
-
-
-def positivity(
-    name: str,
-    value: Operand,
-    terms: Sequence[Term],
-    rules: Sequence[Equation] = (),
-    because: str = "",
-    first: Sequence[Cofactor] = (),
-) -> Positivity:
-    """Return the step value >= 0: subtract `terms` and the cofactors `first`, then rewrite the rest by `rules`."""
-    claim = NonNegative(name, expression(value))
-    remainder = claim.value
-    for term in terms:
-        remainder = remainder - term.value
-    for cofactor in first:
-        remainder = remainder - cofactor.value
-    rest, cofactors = _reduced(remainder, rules)
-    if not rest.vanishes():
-        raise Refused(f"'{name}': {len(rest.canonical().terms)} terms remain after rewriting")
-    return Positivity(claim, tuple(terms), (*first, *cofactors), because)
-
-
-def _reduced(value: Expression, rules: Sequence[Equation]) -> tuple[Expression, tuple[Cofactor, ...]]:
-    """Rewrite the value; for a 1 x 1 value, also transpose a word if its transpose rewrites to a smaller word.
-
-    A number equals its own transpose, so xᵀ W y and yᵀ W x become equal if W is symmetric.
+    Raises
+    ------
+    Refused
+        If the claim does not follow this way.
     """
-    rest, cofactors = rewritten(value, rules)
-    if rest.is_scalar:
+    cofactors = [(left, known.equation(fact), right) for left, fact, right in cofactors]
+    found = reduced(_rest(claim, terms, cofactors), known.rules(fact for _, fact, _ in cofactors))[1]
+    step = Step(claim, because, tuple(terms), (*cofactors, *found))
+    check(step, known)
+    return step
+
+
+def infer(claim: Fact, method: str, known: Known, because: str = "") -> Step:
+    """Return the step by `cancel`, `divide` or `dominate`; Refused if no two known facts fit."""
+    step = next((Step(claim, because, sources=pair) for pair in _pairs(method, known)
+                 if _follows(method, claim, *pair)), None)  # fmt: skip
+    if step is None:
+        raise Refused(f"'{claim.name}': no square or product matches")
+    known.used.update(fact.name for fact in step.sources)
+    return step
+
+
+def check(step: Step, known: Known) -> None:
+    """Check a certificate by expansion: every fact is known, no term is negative, nothing remains."""
+    claim = step.claim
+    if not (claim.relation in "≥⪰" and not claim.entrywise) and (step.terms or claim.relation != "="):
+        raise Refused(f"'{claim.name}': terms show only that a number or a form is not negative")
+    for factors in step.terms:
+        known.used.update(fact.name for fact in reasons(factors, known))
+    for _, fact, _ in step.cofactors:
+        known.equation(fact)
+    rest = _rest(claim, step.terms, step.cofactors)
+    if not rest.vanishes():
+        raise Refused(f"'{claim.name}': {len(rest.terms)} terms remain after the certificate is expanded")
+
+
+def reasons(factors: Factors, known: Known) -> list[Fact]:
+    """Return the facts for which a product is not negative: scalars, then a square, a pairing or a known form."""
+    scalars = [factor for factor in factors if factor.rows == ANY]
+    matrices = [factor for factor in factors if factor.rows != ANY]
+    facts: list[Fact] = []
+    weight = Fraction(1)
+    while scalars:
+        first = scalars.pop(0)
+        if set(first.terms) <= {((), ())}:
+            weight *= sum(first.terms.values(), Fraction(0))
+        elif fact := known.about(first, "≥"):
+            facts.append(fact)
+        elif first in scalars:  # a square
+            scalars.remove(first)
+        else:
+            raise Refused(f"no earlier step proves that {_words(first)} is not negative")
+    if weight <= 0:
+        raise Refused(f"the weight {weight} is not positive")
+    return facts + (_form(matrices, known) if matrices else [])
+
+
+def _form(factors: list[Expression], known: Known) -> list[Fact]:
+    whole, core = product(factors), factors[1:-1]
+    if fact := known.about(whole, "≥⪰≻"):
+        return [fact]
+    if len(factors) in (2, 3) and factors[0] == factors[-1].T:
+        facts = [known.about(each, "⪰≻") for each in core]
+    elif len(factors) in (2, 3) and whole.is_number:
+        facts = [known.about(each, "≥", entrywise=True) for each in (factors[0].T, factors[-1], *core)]
+    else:
+        facts = [None]
+    if None in facts:
+        raise Refused(f"no earlier step proves that {_words(whole)} is not negative")
+    return [fact for fact in facts if fact]
+
+
+def _words(value: Expression) -> str:
+    return " + ".join(" ".join((*scalars, *(each.name for each in word))) for scalars, word in value.terms)
+
+
+def _pairs(method: str, known: Known) -> Iterable[tuple[Fact, ...]]:
+    relation = {"cancel": "≻", "divide": "≠", "dominate": "≥"}[method]
+    for source in known.facts:
+        if method == "cancel":
+            yield (source,)
+        yield from ((source, other) for other in known.facts if other.relation == relation)
+
+
+def _follows(method: str, claim: Fact, source: Fact, other: Fact | None = None) -> bool:
+    """Whether the claim follows from `source` (a square or product) and the sign of `other`."""
+    x, value = claim.difference, source.difference
+    if method == "dominate":
+        return (other is not None and claim.relation == source.relation == "≥" and x.rows == other.lhs.rows == ANY
+                and (other.difference * x - x * x - value).vanishes())  # fmt: skip
+    if claim.relation != "=" or source.relation not in ("=≥⪰" if method == "cancel" else "="):
+        return False
+    if method == "divide":
+        return other is not None and _same(other.difference * x, value)
+    if other is not None and other.lhs.rows != x.rows:
+        return False
+    core = ONE if other is None else other.difference
+    return _same(x.T * core * x, value if source.relation == "=" else -value)
+
+
+def _same(one: Expression, other: Expression) -> bool:
+    return (one.rows, one.cols) == (other.rows, other.cols) and (one - other).vanishes()
+
+
+def _rest(claim: Fact, terms: Iterable[Factors], cofactors: Iterable[Cofactor]) -> Expression:
+    parts = [*map(product, terms), *(left * fact.difference * right for left, fact, right in cofactors)]
+    return claim.difference - reduce(Expression.__add__, parts, number(0))
+
+
+def _is_rule(rule: Fact) -> bool:
+    """Whether the left side is one word and each word of the right side lacks one of its letters or is smaller."""
+    if len(rule.lhs.terms) != 1:
+        return False
+    ((scalars, word),) = rule.lhs.terms
+    letters = {*scalars, *(each.name for each in word)}
+    size = len(scalars) + len(word), sum(each.flipped for each in word)
+    return bool(letters) and all(
+        letters - {*more, *(each.name for each in other)}
+        or (len(more) + len(other), sum(each.flipped for each in other)) < size
+        for more, other in rule.rhs.terms)
+
+
+def reduced(value: Expression, rules: Sequence[Fact]) -> tuple[Expression, list[Cofactor]]:
+    """Rewrite the value; return rest and cofactors with value = rest + sum of cofactors (up to 1 x 1 transposes).
+
+    In a 1 x 1 value also transpose a word if its transpose rewrites to a smaller word: a number equals its own
+    transpose, so xᵀ W y and yᵀ W x become equal if W is symmetric.
+    """
+    rest, cofactors = _rewritten(value, rules)
+    if rest.rows == rest.cols == "1":
         for (scalars, word), coefficient in tuple(rest.ordered()):
-            turned, more = rewritten(word_expression(transposed(word), scalars, coefficient), rules)
+            turned, more = _rewritten(of_word(transposed(word), scalars, coefficient), rules)
             if len(turned.terms) == 1 and next(iter(turned.terms))[1] < word:
-                rest = rest - word_expression(word, scalars, coefficient) + turned
+                rest = rest - of_word(word, scalars, coefficient) + turned
                 cofactors += more
     return rest, cofactors
 
 
-def _first_match(value: Expression, rules: Sequence[Equation]) -> Cofactor | None:
+def _rewritten(value: Expression, rules: Sequence[Fact]) -> tuple[Expression, list[Cofactor]]:
+    cofactors: list[Cofactor] = []
+    while (match := _first_match(value, rules)) is not None:
+        if len(cofactors) == MOST_REPLACEMENTS:
+            raise Refused(f"the rewriting rules form a cycle: more than {MOST_REPLACEMENTS} replacements")
+        cofactors.append(match)
+        value = value - product((match[0], match[1].difference, match[2]))
+    return value, cofactors
+
+
+def _first_match(value: Expression, rules: Sequence[Fact]) -> Cofactor | None:
     for (scalars, word), coefficient in value.ordered():
         for rule in rules:
-            start = _occurrence(scalars, word, rule)
+            (((pattern_scalars, pattern), unit),) = rule.lhs.terms.items()
+            start = _occurrence(scalars, word, pattern_scalars, pattern)
             if start is not None:
-                return _cofactor(scalars, word, coefficient, start, rule)
+                left_over = list(scalars)
+                for name in pattern_scalars:
+                    left_over.remove(name)
+                left = of_word(word[:start], tuple(left_over), coefficient / unit)
+                return left, rule, of_word(word[start + len(pattern) :])
     return None
 
 
-def _occurrence(scalars: Scalars, word: Word, rule: Equation) -> int | None:
-    ((pattern_scalars, pattern),) = rule.lhs.terms
-    if any(scalars.count(s) < pattern_scalars.count(s) for s in pattern_scalars):
+def _occurrence(scalars: Scalars, word: Word, pattern_scalars: Scalars, pattern: Word) -> int | None:
+    if any(scalars.count(name) < pattern_scalars.count(name) for name in pattern_scalars):
         return None
     span = len(pattern)
     return next((i for i in range(len(word) - span + 1) if word[i : i + span] == pattern), None)
-
-
-def _cofactor(scalars: Scalars, word: Word, coefficient: Fraction, start: int, rule: Equation) -> Cofactor:
-    (((pattern_scalars, pattern), unit),) = rule.lhs.terms.items()
-    left_over = list(scalars)
-    for name in pattern_scalars:
-        left_over.remove(name)
-    left = word_expression(word[:start], tuple(left_over), coefficient / unit)
-    return Cofactor(left, rule, word_expression(word[start + len(pattern) :]))

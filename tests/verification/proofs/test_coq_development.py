@@ -12,18 +12,19 @@ import pytest
 from iapb.advice.certificate import EXPORT_HEAD, exported, judge_gains
 from iapb.errors import IapbError
 from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED
-from verification.proofs import coq_development, on_proofs
+from verification.proofs import all_proofs, coq_development, on_proofs
 from verification.proofs.coq_development import (
     FOLDER,
     NO_ANSWER,
     NOT_RUN,
+    STATEMENTS,
     Theorem,
     build_checker,
     compiled,
     lacking,
     theorems,
 )
-from verification.proofs.statement import YES
+from verification.proofs.show import YES
 
 IMPACTS = 1_500  # a hundred thousand were judged alike once: see docs/report.md
 needs_ocaml = pytest.mark.skipif(
@@ -115,6 +116,22 @@ def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, tmp_
     assert all(theorem.holds for theorem in found), found
 
 
+@pytest.mark.parametrize(("now", "then"), [
+    ("(one - e * e) * form", "(one - e) * form"), ("opp (e * J * v)", "e * J * v"), ("W * G * W = W", "W * G * W = G")])
+def test_coq_refuses_a_corrupted_statement(now: str, then: str, tmp_path: Path,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    if reason := lacking(STATEMENTS):
+        pytest.skip(reason)
+    assert {theorem.name for theorem in compiled(STATEMENTS, tmp_path)} < set(all_proofs())
+    source = (FOLDER / f"{STATEMENTS}.v").read_text(encoding="utf-8")
+    assert now in source
+    (tmp_path / "out").mkdir()
+    (tmp_path / f"{STATEMENTS}.v").write_text(source.replace(now, then), encoding="utf-8")
+    monkeypatch.setattr(coq_development, "FOLDER", tmp_path)
+    with pytest.raises(IapbError, match="leaves a remainder|Unable to unify"):
+        compiled(STATEMENTS, tmp_path / "out")
+
+
 def test_an_axiom_of_ones_own_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if reason := lacking("Checker"):
         pytest.skip(reason)
@@ -131,7 +148,7 @@ def test_an_axiom_of_ones_own_is_noticed(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_a_weakened_statement_does_not_keep_its_english(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(coq_development.says(name) == english for name, english in coq_development.SAYS.items())
-    asked = {line.split()[2].rstrip(".") for path in FOLDER.glob("*.v")
+    asked = {line.split()[2].rstrip(".") for path in FOLDER.glob("*.v") if path.stem != STATEMENTS
              for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("Print Assumptions")}
     assert asked == set(coq_development.SAYS) == set(coq_development.STATED)
     source = (FOLDER / "Checker.v").read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ from verification.proofs.bounds import (
     radius_margins,
     unclamped_bound,
 )
-from verification.proofs.statements.floating_point import energy_factor, energy_factor_above_cutoff
+from verification.proofs.numbers import energy_factor, energy_factor_above_cutoff
 
 
 @given(d=st.integers(1, 60), exponent=st.floats(0.0, 20.0))

@@ -1,0 +1,202 @@
+"""Both kernels refuse what does not follow: corrupted statements, corrupted certificates, facts nobody established."""
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from iapb.errors import ArgumentError
+from verification.proofs import all_proofs, by_sympy, check, layout, numbers
+from verification.proofs.cases import definite, holds, read_case
+from verification.proofs.prove import checked
+from verification.proofs.show import text
+from verification.proofs.statement import Statement
+from verification.proofs.steps import Known, Refused, Step, infer, prove
+from verification.proofs.steps import check as check_step
+from verification.proofs.words import Expression, Fact, Reader, letter, product
+
+NAMES = {"A": letter("A", "m", "n"), "B": letter("B", "n", "m"), "C": letter("C", "n", "n"), "x": letter("x", "n", "1"),
+         "y": letter("y", "n", "1"), "s": letter("s"), "q": letter("q")}  # fmt: skip
+READER = Reader(NAMES)
+FACT, VALUE = READER.fact, READER.expression
+DROPPED = ""  # the whole hypothesis
+
+CORRUPTED = [
+    ("theorem_1", "v⁺ = v − (1 + e)", "v⁺ = v + (1 + e)"),
+    ("theorem_1", "loss = (1 − e²) form", "loss = 2 (1 − e²) form"),
+    ("theorem_1", "given   e ≤ 1", DROPPED),
+    ("theorem_2", "v⁺ = v − (1 + e)", "v⁺ = v − (1 − e)"),
+    ("theorem_2", "J v⁺ = −e J v", "J v⁺ = e J v"),
+    ("theorem_2", "given   M is positive definite", DROPPED),
+    ("theorem_2", "given   G is a {1}-inverse", DROPPED),
+    ("impulse_of_independent_rows", "p = −(1 + e) W⁻¹ J v", "p = (1 + e) W⁻¹ J v"),
+    ("newton_law_solvable", "G b + (I − G W) p", "G b + (I + G W) p"),
+    ("independent_subset", "given   R chooses them", DROPPED),
+    ("step_37", "X W X = X\n", "X W X = 2 X\n"),
+    ("reverse_order_law", "given   Penrose 3", DROPPED),
+    ("delassus_definite", "given   the rows are independent", DROPPED),
+    ("single_contact_complementarity", "lemma   −s² ≥ 0", "lemma   s² ≥ 0"),
+    ("coordinate_invariance", "Mᵣ = Fᵀ M F", "Mᵣ = F⁻¹ M F"),
+    ("scaled_impulse", "eₛ = s (1 + e) − 1", "eₛ = s (1 + e) + 1"),
+    ("resting_contact", ":: k = K h + B", ":: k = K h − B"),
+    ("resting_contact", "taken = K (n² − n⁺²) − 2 h f γ", "taken = K (n² − n⁺²) − 4 h f γ"),
+    ("resting_contact", "given   B ≥ 0", DROPPED),
+    ("resting_energy", ":: gained = 2 pᵀ J v⁺", ":: gained = pᵀ J v⁺"),
+    ("resting_energy", "given   u ≥ 0", DROPPED),
+    ("projector_form", "given   Qᵀ Q = I", DROPPED),
+    ("spectral_filter", "sᵀ (I − E²) s ≥ 0", "sᵀ (E² − I) s ≥ 0"),
+    ("damped_impact", "yᵀ W y + 2 (1 + e) λ", "yᵀ W y + 3 (1 + e) λ"),
+    ("any_truncation", "given   Q₁ᵀ Q₂ = 0", DROPPED),
+    ("energy_clamp", "v⁺ᵀ M v⁺ = α slack", "v⁺ᵀ M v⁺ = 2 α slack"),
+    ("poisson_two_lcps", "given   contacts open", DROPPED),
+    ("momentum", "tᵀ M v⁺ = tᵀ M v ", "tᵀ M v⁺ = 2 tᵀ M v "),
+    ("erratum_hypothesis", "given   e is not −1", DROPPED),
+    ("fp_projector", "(1 + e)² δ sᵀ s − u⁺ᵀ u⁺", "(1 + e) δ sᵀ s − u⁺ᵀ u⁺"),
+    ("fp_clamp", "x ≤ (1 − u) X + h @", "x ≤ (1 − u) X − h @"),
+    ("fp_promise", ":: bound + 55/32 ≤ 20 d k", ":: bound + 55/32 ≤ 19 d k"),
+]
+
+
+def certificates(name: str) -> list[list[str]]:
+    return [[line.text for line in step.certificate] for step in check(name).steps]
+
+
+def corrupted(name: str, old: str, new: str) -> layout.Block:
+    given = rf"  {re.escape(old)}.*?\n(?=  \w)" if new == DROPPED else re.escape(old)
+    changed, times = re.subn(given, new, layout.text_of(name), flags=re.DOTALL)
+    assert times == 1
+    return layout.read(name, changed)
+
+
+@pytest.mark.parametrize(("name", "old", "new"), CORRUPTED)
+def test_a_corrupted_statement_is_refused_by_each_kernel(name: str, old: str, new: str,
+                                                         monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    block = corrupted(name, old, new)
+    record = checked(block)
+    assert record.verdict == "not proved" and any(not step.accepted for step in record.steps)
+    number = len(Statement(block).tasks)
+    assert by_sympy.refusal(block, certificates(name)[:number]), "SymPy accepts the certificate of the true statement"
+    monkeypatch.setattr(Expression, "vanishes", lambda self: True)  # the kernel's own expansion is switched off
+    assert checked(block).sympy == "no"
+
+
+@pytest.mark.parametrize("name", all_proofs())
+def test_a_corrupted_certificate_is_refused_by_each_kernel(name: str) -> None:
+    statement, lines = Statement(layout.block(name)), certificates(name)
+    known, sympy = Known([*statement.given, *statement.definitions]), by_sympy.Text(statement.block)
+    for index, task in enumerate(statement.tasks):
+        if task.method:
+            for source in infer(task.claim, task.method, known).sources:
+                with pytest.raises(Refused, match="matches"):
+                    infer(task.claim, task.method, Known([fact for fact in known.facts
+                                                         if fact.difference != source.difference]))
+            known.facts.append(task.claim)
+            continue
+        step = prove(task.claim, known, task.terms, task.cofactors)
+        for wrong in (*(replace(step, terms=(*step.terms, term)) for term in step.terms),
+                      *(replace(step, cofactors=(*step.cofactors, cofactor)) for cofactor in step.cofactors)):
+            if not remainder(wrong).vanishes():  # what is twice a number minus its transpose is still zero
+                with pytest.raises(Refused, match="remain after the certificate is expanded"):
+                    check_step(wrong, known)
+        for line in lines[index]:
+            doubled = [*lines[:index], [*lines[index], line], *lines[index + 1 :]][: len(statement.tasks)]
+            refusal = by_sympy.refusal(statement.block, doubled)
+            assert "SymPy leaves" in refusal or sympy.same(sympy.read(line.replace(" · ", " ")), 0)
+        known.facts.append(task.claim)
+
+
+def remainder(step: Step) -> Expression:
+    cofactors = (left * fact.difference * right for left, fact, right in step.cofactors)
+    return step.claim.difference - sum((*map(product, step.terms), *cofactors), product([VALUE("1 − 1")]))
+
+
+def test_letters_do_not_commute_but_scalars_do() -> None:
+    assert VALUE("s A") == VALUE("A s") and VALUE("(2 A + 1/2 A) x") == VALUE("5/2 A x")
+    assert not (VALUE("B A C") - VALUE("C B A")).vanishes()
+    assert (VALUE("xᵀ C x") - VALUE("xᵀ Cᵀ x")).vanishes(), "a 1 x 1 product equals its transpose"
+    assert not (VALUE("C") - VALUE("Cᵀ")).vanishes()
+    assert VALUE(text(VALUE("s² (A B)ᵀ − 1/3 Bᵀ Aᵀ"))) == VALUE("s² Bᵀ Aᵀ − 1/3 Bᵀ Aᵀ"), "text is read again"
+
+
+@pytest.mark.parametrize("formula", ["A A", "A + B", "A + I", "A + ", "A B)", "(A", "A other", "x ⪰ 0", "A = B = C"])
+def test_what_is_no_formula_is_refused(formula: str) -> None:
+    with pytest.raises(ArgumentError):
+        FACT(formula) if re.search("[=⪰]", formula) else VALUE(formula)
+
+
+@pytest.mark.parametrize(("claim", "facts", "term", "why"), [
+    ("−xᵀ x ≥ 0", "", "−1 xᵀ x", "not positive"), ("−xᵀ x ≥ 0", "", "xᵀ x", "remain after"),
+    ("C C ⪰ 0", "C ⪰ 0", "C C", "no earlier step"), ("Cᵀ C ⪰ 0", "C ≥ 0", "Cᵀ C", ""),
+    ("C ⪰ 0", "C ≥ 0", "C", "no earlier step"), ("xᵀ C y ≥ 0", "C ≻ 0", "xᵀ C y", "no earlier step"),
+    ("s ≥ 0", "", "s", "no earlier step"), ("s³ ≥ 0", "", "s³", "no earlier step"), ("x ≥ 0", "", "x", "terms show"),
+    ("C ≻ 0", "C ≻ 0", "C", "terms show"), ("s ≠ 0", "", "s", "terms show"),
+    ("s q = 0", "s ≥ 0; q ≥ 0", "s q", "terms show"), ("s² ≥ 0", "", "s s", "")])  # fmt: skip
+def test_only_squares_pairings_and_known_forms_are_not_negative(claim: str, facts: str, term: str, why: str) -> None:
+    known = Known([FACT(fact) for fact in facts.split(";") if fact])
+    terms = [tuple(x for x in each if isinstance(x, Expression)) for each in READER.products(term)]
+    if why:
+        with pytest.raises(Refused, match=why):
+            prove(FACT(claim), known, terms)
+    else:
+        prove(FACT(claim), known, terms)
+
+
+def test_entrywise_products_say_nothing_about_matrices() -> None:
+    """[0 1; 1 0] is entrywise non-negative but not positive semi-definite."""
+    known = Known([FACT("C ≥ 0"), FACT("x ≥ 0"), FACT("y ≥ 0")])
+    prove(FACT("xᵀ C y ≥ 0"), known, [(VALUE("xᵀ"), VALUE("C"), VALUE("y"))])
+    with pytest.raises(Refused):
+        prove(FACT("C C ⪰ 0"), known, [(VALUE("C"), VALUE("C"))])
+
+
+def test_a_fact_nobody_established_is_refused() -> None:
+    wanted: Fact = FACT("A B = I")
+    prove(FACT("A B A = A"), Known([wanted]))
+    for facts in ([], [FACT("A B = 2 I")]):
+        with pytest.raises(Refused):
+            prove(FACT("A B A = A"), Known(facts))
+        with pytest.raises(Refused, match="no earlier step proves"):
+            prove(FACT("A B A = A"), Known(facts), cofactors=[(VALUE("1"), wanted, VALUE("A"))])
+    with pytest.raises(Refused, match="remain"):
+        prove(FACT("B A = I"), Known([wanted]))
+
+
+@pytest.mark.parametrize(("method", "claim", "facts"), [
+    ("cancel", "x = 0", "C ≻ 0; xᵀ C x = 0"), ("cancel", "s = 0", "−s² ≥ 0"), ("divide", "x = 0", "s ≠ 0; s x = 0"),
+    ("dominate", "s ≥ 0", "q ≥ 0; q s − s² ≥ 0")])  # fmt: skip
+def test_an_inference_needs_each_of_its_facts(method: str, claim: str, facts: str) -> None:
+    both = [FACT(each) for each in facts.split(";")]
+    infer(FACT(claim), method, Known(both))
+    for kept in (both[:1], both[1:]):
+        if len(both) > 1 or not kept:
+            with pytest.raises(Refused):
+                infer(FACT(claim), method, Known(kept))
+
+
+def test_definiteness_is_decided_exactly() -> None:
+    one, tiny = Fraction(1), Fraction(1, 10**40)
+    assert definite(((one, one), (one, 1 + tiny)), strict=True)
+    assert not definite(((one, one), (one, 1 - tiny)), strict=False)
+    assert definite(((0 * one, 0 * one), (0 * one, one)), strict=False)
+    assert not definite(((0 * one, one), (one, one)), strict=False)
+
+
+def test_both_readings_agree_in_a_case() -> None:
+    block = layout.read("", "  letters C: n n, x y: n, s q\n  let D = C − s I")
+    statement = Statement(block)
+    draw = numbers.random.Random(3)
+    for _ in range(20):
+        rows = " ".join(str(draw.randint(-2, 2)) + ";" * (i == 1) for i in range(4))
+        a, b, s = (draw.randint(-1, 1) for _ in range(3))
+        case = read_case(f"C=[{rows}] x=[1; {a}] y=[0; {b}] s={s} q=1/2", block.shapes)
+        for formula in ("D x = 0", "xᵀ D x ≥ 0", "D ⪰ 0", "D ≻ 0", "D ≥ 0", "(x − y)ᵀ Cᵀ (x + q y) = 0", "s ≠ 0"):
+            assert holds(statement.reader.fact(formula), case) is by_sympy.holds(block, formula, case)
+
+
+def test_exact_kernel_names_what_a_case_lacks() -> None:
+    with pytest.raises(ArgumentError, match="a value for"):
+        holds(FACT("s = 0"), {})
+    for wrong in ("z=1", "s=1 rest"):
+        with pytest.raises(ArgumentError):
+            read_case(wrong, NAMES)

@@ -1,0 +1,107 @@
+"""Checks of a statement: its steps, its witness, the need for each hypothesis, and its false variants (twins)."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from itertools import starmap
+
+from verification.proofs import by_sympy, numbers
+from verification.proofs.cases import Comparison, all_hold, holds
+from verification.proofs.layout import Block, Entry
+from verification.proofs.show import (
+    NO,
+    YES,
+    ProofRecord,
+    Refutation,
+    StepRecord,
+    case_lines,
+    fact_line,
+    number_line,
+    step_lines,
+)
+from verification.proofs.statement import Statement, Task
+from verification.proofs.steps import Known, Refused, infer, prove, reasons
+from verification.proofs.words import Fact, names_in
+
+
+def checked(block: Block) -> ProofRecord:
+    """Check everything about a statement; the verdict is "proved" only if no problem is open."""
+    started = time.perf_counter()
+    statement = Statement(block)
+    known = Known([*statement.given, *statement.definitions])
+    steps = [_checked(task, known) for task in statement.tasks]
+    comparisons, false_comparisons = numbers.BY_STATEMENT[block.name]() if block.all("numbers") else ((), ())
+    needed = tuple(_needed(entry, facts, statement) for entry, facts in statement.hypotheses)
+    twins = (*(_twin(entry, statement) for entry in block.all("twin")), *starmap(_false, false_comparisons))
+    second = by_sympy.refusal(block, [[line.text for line in step.certificate] for step in steps], comparisons)
+    steps += [StepRecord(number_line(*each), "", (), each.is_true, "" if each.is_true else
+                         f"'{each.says}' is false") for each in comparisons]  # fmt: skip
+    problems = (
+        *(f"step refused: {step.refusal}" for step in steps if not step.accepted),
+        *(f"not shown: {refutation.title}" for refutation in (*needed, *twins) if not refutation.refuted),
+        *([f"SymPy refuses a step: {second}"] if second else []),
+        *_loose_ends(statement, known, twins),
+    )
+    (title,), (source,), (says,) = (block.prose(key) for key in ("title", "source", "says"))
+    return ProofRecord(
+        name=block.name, title=title, source=source, statement=says,
+        hypotheses=tuple(map(fact_line, statement.given)), definitions=tuple(map(fact_line, statement.definitions)),
+        steps=tuple(steps), conclusions=tuple(map(fact_line, statement.conclusions)), needed=needed, twins=twins,
+        remarks=block.prose("remark"), assumed=block.prose("assumed"), measured=block.prose("measured"),
+        verdict="not proved" if problems else "proved", problems=problems, seconds=time.perf_counter() - started,
+        sympy=NO if second else YES,
+    )  # fmt: skip
+
+
+def _checked(task: Task, known: Known) -> StepRecord:
+    claim, because = fact_line(task.claim), task.entry.note
+    try:
+        step = (infer(task.claim, task.method, known, because) if task.method else
+                prove(task.claim, known, task.terms, task.cofactors, because))  # fmt: skip
+    except Refused as error:
+        return StepRecord(claim, because, (), False, str(error))
+    lines = step_lines(step, partial(reasons, known=known))
+    known.facts.append(step.claim)
+    return StepRecord(claim, because, lines, True)
+
+
+def _needed(entry: Entry, dropped: list[Fact], statement: Statement) -> Refutation:
+    """Check the exact case which shows that the theorem fails without this hypothesis."""
+    case = statement.case(entry.case)
+    others = [fact for fact in statement.given if fact not in dropped]
+    false = [fact for fact in statement.conclusions if not holds(fact, case)]
+    refuted = bool(entry.case and false) and all_hold(others, case) and not all_hold(dropped, case)
+    title = "without " + " and ".join(f"'{fact.name}'" for fact in dropped)
+    return Refutation(title, fact_line([*false, *statement.conclusions][0]), case_lines(case, statement.names),
+                      entry.note, refuted)  # fmt: skip
+
+
+def _twin(entry: Entry, statement: Statement) -> Refutation:
+    """Check that the case satisfies every hypothesis and breaks the twin's claim, as the kernel and SymPy read it."""
+    title, _, words = entry.words.partition(" :: ")
+    claim, case = statement.reader.fact(entry.formula, words), statement.case(entry.case)
+    refuted = all_hold(statement.given, case) and not holds(claim, case) and not by_sympy.holds(
+        statement.block, entry.formula, case)
+    return Refutation(title, fact_line(claim), case_lines(case, statement.names), entry.note, refuted)
+
+
+def _false(title: str, claim: Comparison, note: str = "") -> Refutation:
+    return Refutation(title, number_line(*claim), (), note, not claim.is_true)
+
+
+def _loose_ends(statement: Statement, known: Known, twins: tuple[Refutation, ...]) -> list[str]:
+    """Return problems that weaken the theorem, such as unused or contradictory hypotheses and circular definitions."""
+    open_ends = [f"hypothesis never used: {fact.name}" for fact in statement.given if fact.name not in known.used]
+    taken: set[str] = set()
+    for definition in statement.definitions:  # each must name one letter that its right side and earlier ones lack
+        new = names_in(definition.lhs)
+        taken |= names_in(definition.rhs)
+        if len(definition.lhs.terms) != 1 or len(new) != 1 or new & taken:
+            open_ends.append(f"not a definition: {definition.name}")
+        taken |= new
+    if not twins:
+        open_ends.append("no wrong twin")
+    if statement.given and not all_hold([*statement.given, *statement.conclusions], statement.case("")):
+        open_ends.append("no exact case satisfies the hypotheses and the conclusions")
+    return open_ends

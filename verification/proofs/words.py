@@ -1,0 +1,264 @@
+"""Words of matrix letters, facts about them, and the reader of formulas as text.
+
+An `Expression` is a finite sum  coefficient * scalars * word.  A word is a product of letters, which do not commute
+(matrices of a *named* size such as c x d, never a number); the scalars (e, α, ...) commute. Two expressions are equal
+only if they have the same terms; no simplifier, numeric size or sample is used. A product with unequal inner sizes
+raises an error, and so does a sum of different shapes.
+
+One rule goes beyond the free algebra: a 1 x 1 product equals its own transpose, so `canonical` brings words of that
+shape to one order.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict, deque
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property, reduce
+from typing import NamedTuple
+
+from iapb.errors import ArgumentError
+
+ANY = "*"  # the size of a multiple of the identity, which fits every square shape
+
+
+class Letter(NamedTuple):
+    """A matrix (or vector) as a letter: its name, the names of its sizes, and whether it is transposed."""
+
+    name: str
+    rows: str
+    cols: str
+    flipped: bool = False
+
+    @property
+    def transposed(self) -> Letter:
+        return Letter(self.name, self.cols, self.rows, not self.flipped)
+
+
+Word = tuple[Letter, ...]
+Scalars = tuple[str, ...]  # a commutative monomial: its factors sorted, each as often as it occurs
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """Sum of terms of one shape; `terms` maps (scalars, word) to a nonzero rational coefficient."""
+
+    terms: dict[tuple[Scalars, Word], Fraction]
+    rows: str = ANY
+    cols: str = ANY
+
+    def __add__(self, other: Expression) -> Expression:
+        total = defaultdict(Fraction, self.terms)
+        for term, coefficient in other.terms.items():
+            total[term] += coefficient
+        return Expression({t: k for t, k in total.items() if k}, *_common_shape(self, other))
+
+    def __mul__(self, other: Expression) -> Expression:
+        rows, cols = _product_shape(self, other)
+        total: defaultdict[tuple[Scalars, Word], Fraction] = defaultdict(Fraction)
+        for (scalars, word), k in self.terms.items():
+            for (more_scalars, more_word), factor in other.terms.items():
+                total[tuple(sorted(scalars + more_scalars)), word + more_word] += k * factor
+        return Expression({t: k for t, k in total.items() if k}, rows, cols)
+
+    def __neg__(self) -> Expression:
+        return number(-1) * self
+
+    def __sub__(self, other: Expression) -> Expression:
+        return self + -other
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and other.terms == self.terms
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self.terms.items()))
+
+    @cached_property
+    def T(self) -> Expression:
+        """The transpose: every word is reversed and every letter flipped."""
+        return Expression({(s, transposed(w)): k for (s, w), k in self.terms.items()}, self.cols, self.rows)
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is a commuting scalar or a 1 x 1 product."""
+        return self.rows == self.cols and self.rows in ("1", ANY)
+
+    def vanishes(self) -> bool:
+        """Whether it is zero in the free algebra, with 1 x 1 words equal to their transposes."""
+        if not (self.rows == self.cols == "1"):
+            return not self.terms
+        total: defaultdict[tuple[Scalars, Word], Fraction] = defaultdict(Fraction)
+        for (scalars, word), k in self.terms.items():
+            total[scalars, min(word, transposed(word))] += k
+        return not any(total.values())
+
+    def ordered(self) -> Iterator[tuple[tuple[Scalars, Word], Fraction]]:
+        """Return the terms in a fixed order, short words first."""
+        return iter(sorted(self.terms.items(), key=lambda item: (len(item[0][1]), item[0][0], item[0][1])))
+
+
+def number(value: Fraction | int) -> Expression:
+    """Return a multiple of the identity."""
+    return Expression({((), ()): Fraction(value)} if value else {})
+
+
+ONE = number(1)
+
+
+def letter(name: str, rows: str = ANY, cols: str = ANY) -> Expression:
+    """Return a letter of shape rows x cols, or a commuting scalar if no sizes are given."""
+    return Expression({((name,), ()): Fraction(1)}) if rows == ANY else of_word((Letter(name, rows, cols),))
+
+
+def of_word(word: Word, scalars: Scalars = (), coefficient: Fraction = Fraction(1)) -> Expression:
+    """Return an expression of one term; the first and the last letter of the word give its shape."""
+    return Expression({(scalars, word): coefficient}, *((word[0].rows, word[-1].cols) if word else (ANY, ANY)))
+
+
+def product(factors: Iterable[Expression]) -> Expression:
+    return reduce(Expression.__mul__, factors, ONE)
+
+
+def transposed(word: Word) -> Word:
+    return tuple(each.transposed for each in reversed(word))
+
+
+def names_in(value: Expression) -> set[str]:
+    """Return the names of all letters and scalars in the expression."""
+    return {name for scalars, word in value.terms for name in (*scalars, *(each.name for each in word))}
+
+
+def _product_shape(left: Expression, right: Expression) -> tuple[str, str]:
+    if left.cols == ANY:
+        return right.rows, right.cols
+    if right.rows != ANY and left.cols != right.rows:
+        shapes = f"{left.rows}x{left.cols} times {right.rows}x{right.cols}"
+        raise ArgumentError("product", shapes, "inner sizes that agree")
+    return left.rows, left.cols if right.rows == ANY else right.cols
+
+
+def _common_shape(left: Expression, right: Expression) -> tuple[str, str]:
+    shapes = [(part.rows, part.cols) for part in (left, right) if part.rows != ANY]
+    lone_identity = len(shapes) == 1 and shapes[0][0] != shapes[0][1] and left.terms and right.terms
+    if len(set(shapes)) > 1 or lone_identity:
+        raise ArgumentError("sum", f"{left.rows}x{left.cols} + {right.rows}x{right.cols}", "equal shapes")
+    return shapes[0] if shapes else (ANY, ANY)
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A relation for all values of the letters that satisfy the other facts; all but an equation compare with 0.
+
+    = equal, ≠ a scalar that is not 0, ≥ a number or every entry of a matrix is not negative, ⪰ x' value x >= 0 for
+    every x, ≻ the same with > for every x other than 0.
+    """
+
+    name: str
+    lhs: Expression
+    relation: str
+    rhs: Expression = number(0)
+
+    @cached_property
+    def difference(self) -> Expression:
+        return self.lhs - self.rhs
+
+    @cached_property
+    def T(self) -> Fact:
+        """The transposed equation, which is equivalent to the equation."""
+        return Fact(f"({self.name})ᵀ", self.lhs.T, self.relation, self.rhs.T)
+
+    @property
+    def entrywise(self) -> bool:
+        return self.relation == "≥" and not self.difference.is_number
+
+
+_RELATION = re.compile(r"\s*([=≠≤≥⪯⪰≻])\s*")
+_POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹"
+_ENDS = frozenset(")]=")
+
+
+class Reader:
+    """Reads formulas whose names are letters, scalars or abbreviations, each given by its expression.
+
+    A product is written without a sign, ᵀ transposes, I is the identity; [a = b] in a product stands for a − b.
+    """
+
+    def __init__(self, names: Mapping[str, Expression]) -> None:
+        self.names = dict(names)
+        words = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
+        self._token = re.compile(rf"\s*({words}|\d+(?:/\d+)?|\S)")
+
+    def expression(self, text: str) -> Expression:
+        return _total(self.products(text))
+
+    def fact(self, text: str, name: str = "") -> Fact:
+        """Return the fact; its name is by default its text."""
+        parts = _RELATION.split(text.strip())
+        if len(parts) != 3:
+            raise ArgumentError("formula", text, "two sides and one of = ≠ ≤ ≥ ⪯ ⪰ ≻")
+        left, relation, right = self.expression(parts[0]), parts[1], self.expression(parts[2])
+        if relation != "=":
+            left, right = (right - left if relation in "≤⪯" else left - right), number(0)
+            relation = {"≤": "≥", "⪯": "⪰"}.get(relation, relation)
+        fact = Fact(name or text.strip(), left, relation, right)
+        if relation in "⪰≻" and fact.difference.rows != fact.difference.cols:
+            raise ArgumentError("formula", text, "a square matrix")
+        return fact
+
+    def products(self, text: str) -> list[tuple[Expression | Fact, ...]]:
+        """Return the terms of a sum, each as the factors of its product."""
+        tokens = deque(self._token.findall(text))
+        found = self._sum(tokens)
+        if tokens:
+            raise ArgumentError("formula", text, f"no {tokens[0]} there")
+        return found
+
+    def _sum(self, tokens: deque[str]) -> list[tuple[Expression | Fact, ...]]:
+        found = []
+        while tokens and tokens[0] not in _ENDS:
+            signed = tokens.popleft() if tokens[0] in "+−-" else ""
+            factors: list[Expression | Fact] = [-ONE] if signed and signed != "+" else []
+            start = len(factors)
+            while tokens and tokens[0] not in _ENDS and tokens[0] not in "+−-":
+                factors += self._factor(tokens)
+            if len(factors) == start or (found and not signed):
+                raise ArgumentError("formula", signed, "a product")
+            found.append(tuple(factors))
+        if not found:
+            raise ArgumentError("formula", "", "a sum of products")
+        return found
+
+    def _factor(self, tokens: deque[str]) -> list[Expression | Fact]:
+        token = tokens.popleft()
+        if token == "[":
+            left = _total(self._sum(tokens))
+            self._expect("=", tokens)
+            right = _total(self._sum(tokens))
+            self._expect("]", tokens)
+            return [Fact("", left, "=", right)]
+        if token == "(":
+            value = _total(self._sum(tokens))
+            self._expect(")", tokens)
+        elif token in self.names:
+            value = self.names[token]
+        elif token[0].isdecimal() or token == "I":
+            value = ONE if token == "I" else number(Fraction(token))
+        else:
+            raise ArgumentError("formula", token, f"one of {' '.join(self.names)}")
+        times = 1
+        while tokens and (tokens[0] == "ᵀ" or tokens[0] in _POWERS):
+            mark = tokens.popleft()
+            value, times = (value.T, times) if mark == "ᵀ" else (value, times * _POWERS.index(mark))
+        return [value] * times
+
+    @staticmethod
+    def _expect(mark: str, tokens: deque[str]) -> None:
+        if not tokens or tokens.popleft() != mark:
+            raise ArgumentError("formula", "", f"a {mark}")
+
+
+def _total(products: Iterable[tuple[Expression | Fact, ...]]) -> Expression:
+    parts = (product(x.difference if isinstance(x, Fact) else x for x in factors) for factors in products)
+    return reduce(Expression.__add__, parts)
