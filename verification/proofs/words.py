@@ -216,7 +216,7 @@ class Reader:
         return found
 
     def _sum(self, tokens: deque[str]) -> list[tuple[Expression | Fact, ...]]:
-        found = []
+        found: list[tuple[Expression | Fact, ...]] = []
         while tokens and tokens[0] not in _ENDS:
             signed = tokens.popleft() if tokens[0] in "+−-" else ""
             factors: list[Expression | Fact] = [-ONE] if signed and signed != "+" else []
