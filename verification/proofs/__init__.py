@@ -56,8 +56,8 @@ def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> 
 
 def _check_with_coq(name: str) -> ProofRecord:
     """Return the record, with Coq's answer for the statements of `Theorems.v`."""
-    theorem = statements().get(name)
-    return replace(check(name), coq=theorem.coq if theorem else NOT_APPLICABLE)
+    record, theorem = check(name), statements().get(name)
+    return replace(record, coq=theorem.coq) if theorem else record
 
 
 def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
