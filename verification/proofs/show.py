@@ -9,7 +9,7 @@ from fractions import Fraction
 from itertools import groupby
 
 from verification.proofs.cases import Case
-from verification.proofs.steps import Cofactor, Factors, Step
+from verification.proofs.steps import Factors, Step
 from verification.proofs.words import ANY, ONE, Expression, Fact
 
 YES, NO, NOT_APPLICABLE = "yes", "no", "not applicable"
@@ -17,11 +17,15 @@ YES, NO, NOT_APPLICABLE = "yes", "no", "not applicable"
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a printed proof: its words and, if there is one, its formula as text and as LaTeX."""
+    """One line of a printed proof: its words and, if there is one, its formula."""
 
     words: str
     text: str = ""
-    latex: str = ""
+
+    @property
+    def latex(self) -> str:
+        """The formula in LaTeX; empty if it holds words."""
+        return "" if "exact rational" in self.text else latex(self.text)
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,10 @@ _GREEK = {mark: latex for latex, mark in _SYMBOLS.items() if mark.isalpha() and 
 _RAISED = {"⁻¹": "-1", "⁺": "+", "⁻": "-", "†": r"\dagger"}
 _LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉ₙₑₕₖₜₛᵣᵢ", "0123456789nehktsri", strict=True))
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-_RELATIONS = {"=": "=", "≠": r"\neq", "<": "<", "≤": r"\leq", ">": ">", "≥": r"\geq", "⪰": r"\succeq", "≻": r"\succ"}
+_MARKS = {"ᵀ": r"\top", "²": "2", "³": "3", "⁴": "4"}
+_OPERATORS = {"+": "+", "−": "-", "=": "=", "≠": r"\neq", "<": "<", "≤": r"\leq", ">": ">", "≥": r"\geq",
+              "⪰": r"\succeq", "≻": r"\succ"}  # fmt: skip
+_LONG = 60  # characters of a rational that is still written out
 
 
 def plain(prose: str) -> str:
@@ -122,104 +129,84 @@ def plain(prose: str) -> str:
 
 def text(value: Expression) -> str:
     """Return an expression as text on one line, as a sum of terms that the reader reads again."""
-    return _sum(value, str, lambda name, power: name + (str(power).translate(_POWERS) if power > 1 else ""),
-                lambda name: name + "ᵀ", " ")
-
-
-def latex(value: Expression) -> str:
-    """Return an expression in LaTeX, as a sum of terms."""
-    return _sum(value, latex_number, lambda name, power: latex_name(name) if power == 1 else
-                f"{{{latex_name(name)}}}^{{{power}}}", lambda name: f"{{{latex_name(name)}}}^{{\\top}}",
-                r" \, ").replace("−", "-")
-
-
-def _sum(value: Expression, write: Callable[[Fraction], str], power: Callable[[str, int], str],
-         flipped: Callable[[str], str], gap: str) -> str:  # fmt: skip
     pieces: list[str] = []
-    unit = "" if value.rows in (ANY, "1") else "I"  # a bare number among matrices is a multiple of the identity
+    unit = [] if value.rows in (ANY, "1") else ["I"]  # a bare number among matrices is a multiple of the identity
     for (scalars, word), coefficient in value.ordered():
-        factors = [power(name, len(list(group))) for name, group in groupby(scalars)]
-        factors += [flipped(each.name) if each.flipped else power(each.name, 1) for each in word] or [unit] * bool(unit)
-        number = [] if abs(coefficient) == 1 and factors else [write(abs(coefficient))]
+        counts = [(name, len(list(group))) for name, group in groupby(scalars)]
+        factors = [name + ("" if power == 1 else str(power).translate(_POWERS)) for name, power in counts]
+        factors += [each.name + "ᵀ" * each.flipped for each in word] or unit
+        number = [] if abs(coefficient) == 1 and factors else [str(abs(coefficient))]
         sign = "−" if coefficient < 0 else "+" if pieces else ""
-        pieces.append((f" {sign} " if pieces else sign) + gap.join(number + factors))
+        pieces.append((f" {sign} " if pieces else sign) + " ".join(number + factors))
     return "".join(pieces) or "0"
 
 
-def latex_name(name: str) -> str:
-    """Return the LaTeX form of a Unicode name such as M⁻¹, γ⁺ or J₁."""
-    upper = "".join(_RAISED[mark] for mark in re.findall("|".join(_RAISED), name))
-    name = re.sub("|".join(_RAISED), "", name)
+def latex(formula: str) -> str:
+    """Return the LaTeX form of a printed formula, or of a value such as M = [1 0; 0 1]."""
+    if value := re.fullmatch(r"(\S+) = \[([^\[\]]*)\]", formula):
+        body = r" \\ ".join(" & ".join(map(_latex_part, row.split())) for row in value[2].split("; "))
+        return f"{_latex_part(value[1])} = \\begin{{pmatrix}} {body} \\end{{pmatrix}}"
+    pieces: list[str] = []
+    for chunk in formula.replace(" · ", " ").split():
+        if chunk in _OPERATORS:
+            pieces += ["", _OPERATORS[chunk], ""]
+        else:
+            pieces += [r"\," if pieces and pieces[-1] else "", _latex_part(chunk)]
+    return " ".join(piece for piece in pieces if piece)
+
+
+def _latex_part(chunk: str) -> str:
+    """Return one number or name in LaTeX, such as −1/2, M⁻¹ᵀ or γ⁺, with the brackets around it."""
+    opening, name, mark, closing = re.fullmatch(r"([(\[−-]*)(.*?)([ᵀ²³⁴]?)([)\]]*)", chunk).groups()  # type: ignore[union-attr]
+    upper = "".join(_RAISED[each] for each in re.findall("|".join(_RAISED), name))
+    name = re.sub(r"(\d+)/(\d+)", r"\\frac{\1}{\2}", re.sub("|".join(_RAISED), "", name))
     lower = "".join(_LOWERED.get(each, "") for each in name)
     base = "".join(_GREEK.get(each, each) for each in name if each not in _LOWERED)
-    return base + (f"_{{{lower}}}" if lower else "") + (f"^{{{upper}}}" if upper else "")
-
-
-def latex_number(value: Fraction) -> str:
-    sign = "-" if value < 0 else ""
-    return str(value) if value.denominator == 1 else f"{sign}\\frac{{{abs(value.numerator)}}}{{{value.denominator}}}"
+    base += (f"_{{{lower}}}" if lower else "") + (f"^{{{upper}}}" if upper else "")
+    return opening.replace("−", "-") + (f"{{{base}}}^{{{_MARKS[mark]}}}" if mark else base) + closing
 
 
 def fact_line(fact: Fact) -> Line:
     """Return a fact as a line: its name in words and its formula."""
     identity = fact.rhs == ONE and fact.lhs.rows not in (ANY, "1")  # then 1 stands for the identity matrix
-    right = ("I", "I") if identity else (text(fact.rhs), latex(fact.rhs))
     return Line(f"{fact.name} (entry by entry)" if fact.entrywise else fact.name,
-                f"{text(fact.lhs)} {fact.relation} {right[0]}",
-                f"{latex(fact.lhs)} {_RELATIONS[fact.relation]} {right[1]}")  # fmt: skip
+                f"{text(fact.lhs)} {fact.relation} {'I' if identity else text(fact.rhs)}")  # fmt: skip
 
 
 def number_line(says: str, left: Fraction, relation: str, right: Fraction) -> Line:
     """Return a comparison of two rationals as a line; a long rational is written as its decimal value."""
-    words = [str(each) if len(str(each)) <= 24 else f"{float(each):.6g} (exact rational of {len(str(each))} characters)"
-             for each in (left, right)]  # fmt: skip
-    maths = f"{latex_number(left)} {_RELATIONS[relation]} {latex_number(right)}"
-    return Line(says, f"{words[0]} {relation} {words[1]}", maths if len(maths) < 160 else "")
+    both = [text if len(text := str(each).replace("-", "−")) <= _LONG else
+            f"{float(each):.6g} (exact rational of {len(text)} characters)" for each in (left, right)]  # fmt: skip
+    return Line(says, f"{both[0]} {relation} {both[1]}")
 
 
 def step_lines(step: Step, reasons: Callable[[Factors], Iterable[Fact]]) -> tuple[Line, ...]:
     """Return the certificate of a step, term by term; `reasons` gives the facts that make a term non-negative."""
     if step.sources:
         return (Line("from " + " and ".join(f"'{fact.name}'" for fact in step.sources)),)
-    return (*(_term_line(factors, reasons(factors)) for factors in step.terms), *map(_cofactor_line, step.cofactors))
-
-
-def _cofactor_line(cofactor: Cofactor) -> Line:
-    left, fact, right = cofactor
-    both = fact_line(fact)
-    plain_, maths = (f"[{each.rpartition(' = ')[0]} {sign} {_bracketed(each.rpartition(' = ')[2])}]"
-                     for each, sign in ((both.text, "−"), (both.latex, "-")))  # fmt: skip
-    if left != ONE:
-        plain_, maths = f"{_bracketed(text(left))} · {plain_}", f"{_bracketed(latex(left))} {maths}"
-    if right != ONE:
-        plain_, maths = f"{plain_} · {_bracketed(text(right))}", f"{maths} {_bracketed(latex(right))}"
-    return Line(f"by '{fact.name}'", plain_, maths)
+    lines = []
+    for factors in step.terms:
+        names = " and ".join(f"'{fact.name}'" for fact in reasons(factors))
+        lines.append(Line(f"non-negative by {names}" if names else "a square",
+                          " · ".join(_bracketed(text(factor)) for factor in factors)))  # fmt: skip
+    for left, fact, right in step.cofactors:
+        one, other = fact_line(fact).text.split(" = ")
+        parts = [f"[{one} − {_bracketed(other)}]"]
+        parts = [_bracketed(text(left))] * (left != ONE) + parts + [_bracketed(text(right))] * (right != ONE)
+        lines.append(Line(f"by '{fact.name}'", " · ".join(parts)))
+    return tuple(lines)
 
 
 def _bracketed(formula: str) -> str:
     """Return the formula, in brackets if a sum or a sign could be misread without them."""
-    misread = formula[0] in "-−" or any(mark in formula for mark in (" + ", " − ", " - "))
-    return f"({formula})" if misread else formula
-
-
-def _term_line(factors: Factors, reasons: Iterable[Fact]) -> Line:
-    names = " and ".join(f"'{fact.name}'" for fact in reasons)
-    return Line(f"non-negative by {names}" if names else "a square",
-                " · ".join(_bracketed(text(factor)) for factor in factors),
-                r" \, ".join(_bracketed(latex(factor)) for factor in factors))  # fmt: skip
+    return f"({formula})" if formula[0] == "−" or " + " in formula or " − " in formula else formula
 
 
 def case_lines(case: Case, names: Mapping[str, Expression]) -> tuple[Line, ...]:
     """Return an exact case as one line per letter."""
-    return tuple(_value_line(name, rows, scalar=names[name].rows == ANY) for name, rows in case.items())
-
-
-def _value_line(name: str, rows: tuple[tuple[Fraction, ...], ...], *, scalar: bool) -> Line:
-    if scalar:
-        return Line("", f"{name} = {rows[0][0]}", f"{latex_name(name)} = {latex_number(rows[0][0])}")
-    body = r" \\ ".join(" & ".join(map(latex_number, row)) for row in rows)
-    return Line("", f"{name} = [{'; '.join(' '.join(map(str, row)) for row in rows)}]",
-                f"{latex_name(name)} = \\begin{{pmatrix}} {body} \\end{{pmatrix}}")
+    plain_rows = {name: "; ".join(" ".join(map(str, row)) for row in rows) for name, rows in case.items()}
+    return tuple(Line("", f"{name} = " + (rows if names[name].rows == ANY else f"[{rows}]"))
+                 for name, rows in plain_rows.items())  # fmt: skip
 
 
 def _formula(line: Line) -> str:
