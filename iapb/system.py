@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -255,11 +254,8 @@ class System:
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
         """Return the effects under a law and a coupling; the world, the port and the record are made from them."""
-        return decide_for(self.scene, self._facts, law, coupling)
-
-    @cached_property
-    def _facts(self) -> Facts:
-        return facts_of(self.scene, self.mechanism, self.shapes, self.pairs)
+        facts = facts_of(self.scene, self.mechanism, self.shapes, self.pairs)
+        return decide_for(self.scene, facts, law, coupling)
 
 
 _SYSTEMS: dict[int, System] = {}  # the last used ones, by the identity of the scene, which the system keeps alive

@@ -97,11 +97,9 @@ def measure(world, port):
 
 @kernel
 def sense(world, port, velocity):
-    """Write positions rounded to the sensors' resolution, and velocities from their difference over one step.
+    """Write positions rounded to the sensors' resolution (0: exact), velocities from their difference over a step.
 
-    Both are exact where the resolution is 0. At the first reading, which has no predecessor, the velocity is exact too.
-    A joint whose coordinates are no vector (quaternions, cosine and sine) has sensors that count: each reading moves by
-    whole steps, in metres and radians of its tangent, to the one nearest to the true pose.
+    The first velocity is exact. Sensors of quaternions and of (cos, sin) count whole steps in the joint's tangent.
     """
     first, m = port.clock[0] == 0, port.mechanism
     difference(m, port.sensed_q, port.device_q, port.error)

@@ -126,9 +126,7 @@ class Mechanism:
 
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector coordinates."""
-        out = np.empty(self.nq)
-        entries.integrate(self.block, self._place(q), self._rates(v), float(dt), out)
-        return out
+        return self._filled((self.nq,), entries.integrate, self._place(q), self._rates(v), float(dt))
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest rotations."""

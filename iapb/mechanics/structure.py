@@ -69,28 +69,20 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         carrier.append(b if moves[b] else carrier[parent] if parent >= 0 else -1)
     moving, carriers = np.flatnonzero(moves), np.array(carrier)
     new_index = {b: i for i, b in enumerate(moving.tolist())} | {-1: -1}
-    masses, centers, inertias = [], [], []
-    for body in moving:
+    parts = MechanismArrays(*(rows[moving] for rows in m[:-3]), *m[-3:])._replace(  # the last three are along the dofs
+        parent=np.array([new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64),
+        dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64))
+    for i, body in enumerate(moving):
         members = np.flatnonzero(carriers == body)
-        mass, center = sum(m.mass[members].tolist()), m.center_of_mass[body]
+        parts.mass[i] = mass = sum(m.mass[members].tolist())
         places = np.array([own[b][1] + product(own[b][0], m.center_of_mass[b]) for b in members])
         if len(members) > 1 and mass > 0.0:
-            center = product(places.T, m.mass[members]) / mass
-        masses.append(mass)
-        centers.append(center)
-        inertias.append(sum((turned_inertia(own[b][0], m.inertia[b]) + m.mass[b] * point_inertia(place - center)
-                             for b, place in zip(members, places, strict=True)), np.zeros((3, 3))))
-    same = ("kind", "q_start", "v_start", "v_count", "joint_axis", "last_dof")
-    return m._replace(
-        **{name: getattr(m, name)[moving] for name in same},
-        parent=np.array([new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64),
-        placement_rotation=np.array([placed[b][0] for b in moving]).reshape(-1, 3, 3),
-        placement_position=np.array([placed[b][1] for b in moving]).reshape(-1, 3),
-        mass=np.array(masses, np.float64),
-        center_of_mass=np.array(centers).reshape(-1, 3),
-        inertia=np.array(inertias).reshape(-1, 3, 3),
-        dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64),
-    )
+            parts.center_of_mass[i] = product(places.T, m.mass[members]) / mass
+        parts.inertia[i] = sum((
+            turned_inertia(own[b][0], m.inertia[b]) + m.mass[b] * point_inertia(place - parts.center_of_mass[i])
+            for b, place in zip(members, places, strict=True)), np.zeros((3, 3)))
+        parts.placement_rotation[i], parts.placement_position[i] = placed[body]
+    return parts
 
 
 def turned_inertia(rotation: Floats, inertia: Floats) -> Floats:

@@ -10,11 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb import recording
-from iapb.contact.laws import ImpulseAugmented
-from iapb.recording import CONTACTS, IMPACTS, Recorder, chunk_steps
+from iapb.recording import Recorder, chunk_steps
 from iapb.run import Run
 from iapb.scene import find_scene, load_scene
-from iapb.schema import quantities
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
 
@@ -47,36 +45,6 @@ def test_chunks_go_forward_and_bound_time_and_memory(contacts, remaining):
     steps = chunk_steps(contacts, remaining)
     assert 1 <= steps <= min(remaining, 512)
     assert steps == 1 or steps * contacts <= 200_000
-
-
-@pytest.mark.parametrize(
-    ("name", "coupling"), [("peg_corner", "four-channel"), ("arm_pushing", "unilateral"), ("newton_cradle", "none")]
-)
-def test_the_record_holds_what_each_step_did(name, coupling):
-    scene = load_scene(find_scene(name))
-    chosen = coupling_of(scene, coupling)
-    run = simulate(scene, ImpulseAugmented(), chosen, steps=STEPS)
-    simulation = Simulation(scene, ImpulseAugmented(), chosen)
-    state, port, impact = simulation.state, simulation.port, 0
-    for k in range(STEPS):
-        simulation.step()
-        rows = slice(run.contacts.offsets[k], run.contacts.offsets[k + 1])
-        count, logged = state.contact_count[0], state.impacts.logged[0]
-        assert rows.stop - rows.start == count
-        for each in CONTACTS:
-            made = state.contact_impulse if each.name == "impulse" else getattr(state.contacts, each.name)
-            assert np.array_equal(getattr(run.contacts, each.name)[rows], made[:count]), each.name
-        for each in quantities(Run, "step"):
-            made = simulation.state if hasattr(state, each.name) else port
-            if each.name != "state":
-                assert np.array_equal(getattr(run, each.name)[k], getattr(made, each.name)), each.name
-        assert np.all(run.impacts.step[impact : impact + logged] == k)
-        for each in IMPACTS[1:]:
-            found = getattr(run.impacts, each.name)[impact : impact + logged]
-            assert np.array_equal(found, getattr(state.impacts, each.name)[:logged]), each.name
-        impact += logged
-    assert impact == len(run.impacts.step)
-    assert len(run.contacts.gap) == run.contacts.offsets[-1] > 0
 
 
 @pytest.mark.parametrize("bytes_of_record", [1.0, 1e5, 1e9])

@@ -17,55 +17,60 @@ from iapb.contact.laws import RENDERINGS, ImpulseAugmented, Penalty, StepResult
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.mechanics.integrators import INTEGRATORS
+from iapb.recording import CONTACTS, IMPACTS
 from iapb.run import FREE, Run
 from iapb.scene import find_scene, load_scene, scene_from_text
+from iapb.schema import quantities
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of, system_of
 from tests.iapb.test_recording import assert_same, results_of
+from tests.iapb.test_simulation_stops import Wrapped
 
 # A tilted, rough peg and a weak device: contacts one by one, friction, and impulses that exceed the limits.
 PEG = load_scene(find_scene("peg_corner")).with_values({
     "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
     "device.delay": 2, "device.position_resolution": [1e-5, 1e-5, 0], "device.damping": [0.5, 0.5, 0],
 })
+CRADLE = load_scene(find_scene("newton_cradle"))
 ARM = load_scene(find_scene("arm_pushing"))  # inertia that varies, velocity terms, a group of two trees
 STEPS = 350  # past the fourth collision of the peg
 COUPLINGS = ("none", "four-channel", "unilateral")
 LAWS = [Penalty(), *(ImpulseAugmented(rendering=rendering) for rendering in RENDERINGS)]
 LAWS += [ImpulseAugmented(integrator=name) for name in INTEGRATORS if name != "semi_implicit_euler"]
-STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
+FORCES = tuple(each.name for each in quantities(Run, "step") if each.name != "state")
 
 
 def name_of(law):
     return "-".join([law.name.split(" ")[0], *map(str, law.settings.values())])
 
 
-@pytest.mark.parametrize("scene", [PEG, ARM], ids=lambda scene: scene.name)
-@pytest.mark.parametrize("coupling", COUPLINGS)
+@pytest.mark.parametrize(("scene", "coupling"), [*itertools.product((PEG, ARM), COUPLINGS), (CRADLE, "none")],
+                         ids=lambda value: getattr(value, "name", value))
 @pytest.mark.parametrize("law", LAWS, ids=name_of)
-def test_the_compiled_loop_is_the_loop_stepped_from_python_bit_for_bit(scene, law, coupling):
+def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(scene, coupling, law):
     chosen = coupling_of(scene, coupling)
-    run = simulate(scene, law, chosen, steps=STEPS)
-    stepped = Simulation(scene, law, chosen)
+    run, stepped = simulate(scene, law, chosen, steps=STEPS), Simulation(scene, law, chosen)
+    state, port, impact = stepped.state, stepped.port, 0
     for k in range(STEPS):
         result = stepped.step()
-        for name in STEP_VECTORS:
-            assert np.array_equal(getattr(result, name), getattr(run, name)[k + (name in "qv")]), (k, name)
-        assert np.array_equal(stepped.port.device_q, run.device_q[k + 1])
-        assert np.array_equal(stepped.port.device_v, run.device_v[k + 1])
-        assert np.array_equal(stepped.port.device_force, run.device_force[k])
+        for names, line in ((("q", "v", "device_q", "device_v"), k + 1), (FORCES, k)):
+            for name in names:
+                made = next(getattr(each, name) for each in (result, port, state) if hasattr(each, name))
+                assert np.array_equal(getattr(run, name)[line], made), (k, name)
         assert result.state == run.state[k]
-    assert stepped.time == run.time[-1]
-    assert np.any(run.state != FREE)
-
-
-class Wrapped:
-    """The engine's law as a law of the caller's own, known by its protocol alone."""
-
-    name, rendering, settings = "wrapped", "full", {}
-
-    def advance(self, system, state, applied_force, dt):
-        return ImpulseAugmented().advance(system, state, applied_force, dt)
+        rows = slice(run.contacts.offsets[k], run.contacts.offsets[k + 1])
+        count, logged = state.contact_count[0], state.impacts.logged[0]
+        assert rows.stop - rows.start == count
+        for each in CONTACTS:
+            made = state.contact_impulse if each.name == "impulse" else getattr(state.contacts, each.name)
+            assert np.array_equal(getattr(run.contacts, each.name)[rows], made[:count]), each.name
+        assert np.all(run.impacts.step[impact : impact + logged] == k)
+        for each in IMPACTS[1:]:
+            found = getattr(run.impacts, each.name)[impact : impact + logged]
+            assert np.array_equal(found, getattr(state.impacts, each.name)[:logged]), each.name
+        impact += logged
+    assert stepped.time == run.time[-1] and impact == len(run.impacts.step)
+    assert len(run.contacts.gap) == run.contacts.offsets[-1] > 0 and np.any(run.state != FREE)
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS)
