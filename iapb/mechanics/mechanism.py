@@ -149,37 +149,37 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        place, out = float_array("q", q, (self.nq,)), np.empty((1, self.nv, self.nv))
-        if not entries.mass_matrices_at(self._scratch.parts, place[None], out):
+        place, out = float_array("q", q, (self.nq,)), np.empty((self.nv, self.nv))
+        if not entries.mass_matrices_at(self._scratch.parts, place, out):
             self._place(place)
-        return out[0]
+        return out
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
         places = float_array("qs", qs, (-1, self.nq))
-        out = np.empty((len(places), self.nv, self.nv))
-        if not entries.mass_matrices_at(self._scratch.parts, places, out):
+        out = np.empty((len(places) * self.nv, self.nv))
+        if not entries.mass_matrices_at(self._scratch.parts, places.reshape(-1), out):
             self._check_states(places)
-        return out
+        return out.reshape(len(places), self.nv, self.nv)
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
         place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
-        out = np.empty((1, self.nv))
-        if not entries.biases_at(self._scratch.parts, place[None], rates[None], out):
+        out = np.empty(self.nv)
+        if not entries.biases_at(self._scratch.parts, place, rates, out):
             self._place(place)
             self._rates(rates)
-        return out[0]
+        return out
 
     def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
         places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
         if len(places) != len(rates):
             raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
-        out = np.empty(rates.shape)
-        if not entries.biases_at(self._scratch.parts, places, rates, out):
+        out = np.empty(rates.size)
+        if not entries.biases_at(self._scratch.parts, places.reshape(-1), rates.reshape(-1), out):
             self._check_states(places, rates)
-        return out
+        return out.reshape(rates.shape)
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""

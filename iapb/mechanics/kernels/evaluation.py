@@ -42,23 +42,29 @@ def misplaced_body(m, q):
 
 @kernel
 def mass_matrices_at(at, q, out):
-    """out (n, d, d) <- M at each row of q (n, nq); return False at the first that is not valid."""
-    for k in range(q.shape[0]):
-        if misplaced_body(at.mechanism, q[k]) >= 0:
+    """out (n d, d) <- M at each of n configurations, q (n nq,); return False at the first that is not valid."""
+    d = out.shape[1]
+    n = out.shape[0] // max(d, 1)
+    for k in range(n):
+        place = q[k * q.shape[0] // n : (k + 1) * q.shape[0] // n]
+        if misplaced_body(at.mechanism, place) >= 0:
             return False
-        forward_kinematics(at.mechanism, q[k], at.workspace)
-        mass_matrix(at.mechanism, at.workspace, out[k])
+        forward_kinematics(at.mechanism, place, at.workspace)
+        mass_matrix(at.mechanism, at.workspace, out[k * d : (k + 1) * d])
     return True
 
 
 @kernel
 def biases_at(at, q, v, out):
-    """out (n, d) <- B at each row of q (n, nq) and v (n, d); return False at the first that is not valid."""
-    for k in range(q.shape[0]):
-        if misplaced_body(at.mechanism, q[k]) >= 0 or not all_finite(v[k]):
+    """out (n d,) <- B at each of n states, q (n nq,) and v (n d,); return False at the first that is not valid."""
+    d = at.mechanism.dof_body.shape[0]
+    n = v.shape[0] // max(d, 1)
+    for k in range(n):
+        place, rates = q[k * q.shape[0] // n : (k + 1) * q.shape[0] // n], v[k * d : (k + 1) * d]
+        if misplaced_body(at.mechanism, place) >= 0 or not all_finite(rates):
             return False
-        forward_kinematics(at.mechanism, q[k], at.workspace)
-        bias(at.mechanism, at.workspace, v[k], out[k])
+        forward_kinematics(at.mechanism, place, at.workspace)
+        bias(at.mechanism, at.workspace, rates, out[k * d : (k + 1) * d])
     return True
 
 

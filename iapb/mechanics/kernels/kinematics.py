@@ -3,7 +3,7 @@
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
 from iapb.linalg import add, column, cross, load, scale, store, store_columns, subtract, transform, turn_frame
-from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL
+from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMATIC, REVOLUTE
 
 
 @kernel
@@ -14,14 +14,6 @@ def turn_about_axis(w, b, a, c, s):
     turn_frame(w.rotation, b, (c + u * x * x, u * x * y + s * z, u * x * z - s * y),
                (u * x * y - s * z, c + u * y * y, u * y * z + s * x),
                (u * x * z + s * y, u * y * z - s * x, c + u * z * z))
-
-
-@kernel
-def turn_by_quaternion(w, b, x, y, z, s):
-    """R <- R R(x, y, z, s), unit quaternion with scalar part s."""
-    turn_frame(w.rotation, b, (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + s * z), 2.0 * (x * z - s * y)),
-               (2.0 * (x * y - s * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + s * x)),
-               (2.0 * (x * z + s * y), 2.0 * (y * z - s * x), 1.0 - 2.0 * (x * x + y * y)))
 
 
 @kernel
@@ -37,10 +29,9 @@ def move_joint(m, q, w, b):
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
     if kind == PLANAR:  # axes of the joint frame: they do not turn with the body
         body_axes_to_dofs(w, b, k)
-        shift = transform(w.rotation, b, (q[i], q[i + 1], 0.0))
+        store(w.position, b, add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], 0.0))))
         s, c = sine_cosine(q[i + 2])
         turn_about_axis(w, b, (0.0, 0.0, 1.0), c, s)
-        store(w.position, b, add(load(w.position, b), shift))
     elif kind == PRISMATIC:
         store(w.axis, k, transform(w.rotation, b, load(m.joint_axis, b)))
         store(w.position, b, add(load(w.position, b), scale(q[i], load(w.axis, k))))
@@ -49,15 +40,16 @@ def move_joint(m, q, w, b):
         store(w.axis, k, transform(w.rotation, b, a))
         s, c = sine_cosine(q[i]) if kind == REVOLUTE else (q[i + 1], q[i])
         turn_about_axis(w, b, a, c, s)
-    elif kind == SPHERICAL:
-        turn_by_quaternion(w, b, q[i], q[i + 1], q[i + 2], q[i + 3])
-        body_axes_to_dofs(w, b, k)
-    elif kind == FREE_FLYER:
-        shift = transform(w.rotation, b, (q[i], q[i + 1], q[i + 2]))
-        turn_by_quaternion(w, b, q[i + 3], q[i + 4], q[i + 5], q[i + 6])
-        store(w.position, b, add(load(w.position, b), shift))
-        body_axes_to_dofs(w, b, k)
-        body_axes_to_dofs(w, b, k + 3)
+    elif kind != FIXED:  # a unit quaternion, after the position of a free flyer
+        if kind == FREE_FLYER:
+            store(w.position, b, add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], q[i + 2]))))
+            i += 3
+        x, y, z, s = q[i], q[i + 1], q[i + 2], q[i + 3]
+        turn_frame(w.rotation, b, (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + s * z), 2.0 * (x * z - s * y)),
+                   (2.0 * (x * y - s * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + s * x)),
+                   (2.0 * (x * z + s * y), 2.0 * (y * z - s * x), 1.0 - 2.0 * (x * x + y * y)))
+        for first in range(k, k + m.v_count[b], 3):
+            body_axes_to_dofs(w, b, first)
 
 
 @kernel
@@ -67,12 +59,13 @@ def forward_kinematics(m, q, w):
     Quaternions and (cos, sin) pairs must have length one; kernels do not check. A joint frame has
     R = R_parent R_placement, p = p_parent + R_parent p_placement.
     """
-    placed = q.shape[0] > 0
-    for k in range(q.shape[0]):
-        placed = placed and q[k] == w.placed_q[k]
-        w.placed_q[k] = q[k]
-    if placed:
+    n, same = q.shape[0], 0
+    while same < n and q[same] == w.placed_q[same]:
+        same += 1
+    if 0 < n == same:
         return
+    for k in range(same, n):
+        w.placed_q[k] = q[k]
     R, fixed = w.rotation, m.placement_rotation
     for b in range(m.kind.shape[0]):
         parent, offset = m.parent[b], load(m.placement_position, b)
@@ -82,8 +75,7 @@ def forward_kinematics(m, q, w):
             offset = add(load(w.position, parent), transform(R, parent, offset))
         store_columns(R, b, x, y, z)
         store(w.position, b, offset)
-        if m.kind[b] != FIXED:
-            move_joint(m, q, w, b)
+        move_joint(m, q, w, b)
         store(w.center, b, add(load(w.position, b), transform(w.rotation, b, load(m.center_of_mass, b))))
 
 
