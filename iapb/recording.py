@@ -53,17 +53,6 @@ def chunk_steps(contacts: int, remaining: int) -> int:
     return max(1, min(remaining, _STEPS_PER_CHUNK, _CONTACT_ROWS_PER_CHUNK // max(1, contacts)))
 
 
-def bytes_per_step(simulation: Any) -> int:
-    """Return the bytes that a step without contacts adds to a run: lines (twice, for joining) and energies."""
-    return 2 * _line_bytes(coordinates_of(simulation), 0, 0) + 8 * len(FORCES) + 40
-
-
-def coordinates_of(simulation: Any) -> Coordinates:
-    """Return the lengths of q and v, of the scene and of the device."""
-    mechanism, port = simulation.system.mechanism, simulation.port
-    return mechanism.nq, mechanism.nv, len(port.device_q), len(port.device_v)
-
-
 def _line_bytes(coordinates: Coordinates, contacts: int, trees: int) -> int:
     """Return the bytes of the lines of a step with so many contacts and trees."""
     return sum(array.nbytes for array in make_record(1, coordinates, contacts, trees).arrays()[1:])
@@ -141,7 +130,7 @@ class Recorder:
         port, state, system = simulation.port, simulation.state, simulation.system
         self.start = {"q": state.q.copy(), "v": state.v.copy(),
                       "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
-        self.coordinates = coordinates_of(simulation)
+        self.coordinates = len(state.q), len(state.v), len(port.device_q), len(port.device_v)
         self._shape = self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
         self._line_bytes = _line_bytes(*self._shape)
         self.chunks: list[tuple[Any, int, float]] = []  # record, steps and seconds of each chunk held
@@ -153,6 +142,11 @@ class Recorder:
     def records(self) -> list[Any]:
         """The records of the chunks held, each once."""
         return list({id(record): record for record, _, _ in self.chunks}.values())
+
+    @property
+    def bytes_per_step(self) -> int:
+        """Bytes that a step without contacts adds to a run: lines (twice, for joining) and energies."""
+        return 2 * _line_bytes(self.coordinates, 0, 0) + 8 * len(FORCES) + 40
 
     @property
     def held_bytes(self) -> int:

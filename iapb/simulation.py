@@ -32,7 +32,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
 from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device, render
-from iapb.recording import Recorder, bytes_per_step, write_step
+from iapb.recording import Recorder, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.system import System, system_of, wrenches_of
@@ -309,8 +309,8 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
         law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
     simulation = Simulation(system_of(scene), law, coupling)
     total = simulation.scene.steps if steps is None else int(steps)
-    _check_memory(simulation, total, max_memory)
     recorder = Recorder(simulation)
+    _check_memory(recorder.bytes_per_step, total, max_memory)
 
     def keep() -> None:
         if checkpoint is not None and checkpoint.due:
@@ -365,13 +365,12 @@ def record(recording: Recorder, total: int, progress: Callable[[int, int], None]
     return "" if recording.steps == total else why
 
 
-def _check_memory(simulation: Simulation, steps: int, most: float | None) -> None:
-    """Raise an ArgumentError if the record takes more than `most` bytes; default: half of the machine's memory."""
+def _check_memory(each: int, steps: int, most: float | None) -> None:
+    """Raise an ArgumentError if the steps take more than `most` bytes; default: half of the machine's memory."""
     if most is None:
         most = 4e9  # if the system does not report it
         with suppress(AttributeError, ValueError, OSError):
             most = 0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    each = bytes_per_step(simulation)
     if steps * each > most:
         raise ArgumentError("steps", steps, f"at most {int(most / each):,}: the record takes {each} bytes a step and "
                             f"more with contacts, {_bytes(steps * each)} in all, of {_bytes(most)} that it may take. "

@@ -32,17 +32,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.structure import make_free_motion
 from iapb.run import ImpactTable
 from iapb.scene import Scene, SpatialScene
-from iapb.scene.mechanism import (
-    frictions_of,
-    joint_damping_of,
-    mechanism_of,
-    pairs_of,
-    restitution_by_shape,
-    restitutions_of,
-    shapes_of,
-    start_of,
-    stops_of,
-)
+from iapb.scene import mechanism as scene_parts
 from iapb.schema import Floats, blank, quantities, zeros_of
 
 _factored = Entry(cholesky)
@@ -75,13 +65,14 @@ class System:
         self.given = scene
         self.scene, self.remarks = settled(scene)
         scene = self.scene
-        self.mechanism: Mechanism = mechanism_of(scene)
-        self.shapes = shapes_of(scene)
-        self.pairs = pairs_of(scene, self.shapes)
-        self.stops = stops_of(scene, self.mechanism)
+        self.mechanism: Mechanism = scene_parts.mechanism_of(scene)
+        self.shapes = scene_parts.shapes_of(scene)
+        self.pairs = scene_parts.pairs_of(scene, self.shapes)
+        self.stops = scene_parts.stops_of(scene, self.mechanism)
         self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
-        self.joint_damping, self.start = joint_damping_of(scene), start_of(scene)
-        self.restitutions, self.frictions = restitutions_of(scene, self.pairs), frictions_of(scene)
+        self.joint_damping, self.start = scene_parts.joint_damping_of(scene), scene_parts.start_of(scene)
+        self.restitutions = scene_parts.restitutions_of(scene, self.pairs)
+        self.frictions = scene_parts.frictions_of(scene)
         self.dt = 1.0 / scene.rate
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tangents = 2 if isinstance(scene, SpatialScene) else 1
@@ -129,16 +120,12 @@ class System:
         return self._engine(law)[1]
 
     def _engine(self, law: Any, effects: Sequence[Effect] | None = None) -> tuple[World, Entry]:
-        law = law.within(self.scene)
+        """Return the parameters of the scene with the switches of its effects under a law, and the step; made once."""
+        scene, contact, mechanism, law = self.scene, self.scene.contact, self.mechanism, law.within(self.scene)
         key = law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.pushing
-        if key not in self._worlds:
-            self._worlds[key] = self._world(law, self.decide(law) if effects is None else effects), Entry(advance)
-        return self._worlds[key]
-
-    def _world(self, law: Any, effects: Sequence[Effect]) -> Any:
-        """Return the parameters of the scene and the switches of its effects under a law."""
-        scene, contact, mechanism = self.scene, self.scene.contact, self.mechanism
-        limit, on = np.full(mechanism.nv, np.inf), active_names(effects)
+        if key in self._worlds:
+            return self._worlds[key]
+        limit, on = np.full(mechanism.nv, np.inf), active_names(self.decide(law) if effects is None else effects)
         scaled = "device_limits" in on and law.rendering in ("scale", "spread")
         if scaled and scene.device is not None:
             limit[slice(*self.tool_dofs)] = scene.device.force_limit
@@ -152,7 +139,7 @@ class System:
         )
         integrator = INTEGRATORS[law.integrator]
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
-        return block(World(
+        world: Any = block(World(
             mechanism=mechanism.block, shapes=self.shapes, pairs=self.pairs,
             broad_phase=make_broad_phase(self.shapes, self.pairs if switches.broad_phase else self.pairs[:0]),
             tree_of_body=mechanism.tree_of_body, tree_start=np.ascontiguousarray(ranges[:, 0]),
@@ -162,12 +149,14 @@ class System:
             coulomb=flag("friction" in on and (contact.friction_law == "coulomb" or contact.forces == "implicit")),
             implicit=flag(contact.forces == "implicit"), tangents=self.tangents,
             restitution=float(self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution),
-            own_restitution=restitution_by_shape(scene), per_body_rows=contact.self_collision_rows == "per_body",
+            own_restitution=scene_parts.restitution_by_shape(scene),
+            per_body_rows=contact.self_collision_rows == "per_body",
             joint_damping=self.joint_damping, stops=self.stops, impulse_limit=limit,
             stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
             semi_implicit=integrator.semi_implicit, conserving=integrator.conserving,
             free=make_free_motion(mechanism.arrays, mechanism.tree_of_body),
         ))
+        return self._worlds.setdefault(key, (world, Entry(advance)))
 
     def make_state(self) -> Any:
         """Return a new state at the scene's start."""

@@ -20,13 +20,7 @@ SYMMETRY_TOLERANCE = 1e-12
 
 
 def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return value as a contiguous float array of that shape (-1 first: any length), not copied if it is one.
-
-    Raises
-    ------
-    ArgumentError
-        Wrong shape, or not numbers. Entries may be NaN or infinite.
-    """
+    """Return value as a contiguous float array of that shape (-1 first: any length), or raise ArgumentError."""
     try:
         array = np.asarray(value, np.float64, "C")
     except (TypeError, ValueError):
@@ -38,13 +32,7 @@ def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floa
 
 
 def finite_array(argument: str, value: ArrayLike, shape: tuple[int, ...], unit: str = "") -> Floats:
-    """Return a copy of value as a float array of that shape.
-
-    Raises
-    ------
-    ArgumentError
-        Wrong shape, not numbers, NaN or infinite.
-    """
+    """Return a copy of value as a float array of that shape with finite numbers, or raise ArgumentError."""
     array = float_array(argument, value, shape).copy()
     if not np.isfinite(array).all():
         raise ArgumentError(argument, value, f"finite numbers{f' [{unit}]' if unit else ''}")
@@ -99,13 +87,9 @@ class Body:
 
 
 def parents_and_trees(bodies: Sequence[Body]) -> tuple[list[int], list[int]]:
-    """Return each body's parent as an index, -1 = world, and its tree; trees are numbered in the order of their roots.
+    """Return each body's parent as an index, -1 = world, and its tree, or raise ArgumentError.
 
-    Raises
-    ------
-    ArgumentError
-        A repeated name, an unknown parent, a parent after its child, or a tree whose bodies are not
-        consecutive (M would not be block diagonal).
+    Trees are numbered in the order of their roots; their bodies are consecutive, so that M is block diagonal.
     """
     index: dict[str, int] = {}
     parents: list[int] = []

@@ -69,7 +69,8 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         carrier.append(b if moves[b] else carrier[parent] if parent >= 0 else -1)
     moving, carriers = np.flatnonzero(moves), np.array(carrier)
     new_index = {b: i for i, b in enumerate(moving.tolist())} | {-1: -1}
-    parts = MechanismArrays(*(rows[moving] for rows in m[:-3]), *m[-3:])._replace(  # the last three are along the dofs
+    parts = m._replace(**{name: rows[moving] for name, rows in m._asdict().items() if not name.startswith("dof_")})
+    parts = parts._replace(
         parent=np.array([new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64),
         dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64))
     for i, body in enumerate(moving):

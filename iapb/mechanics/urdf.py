@@ -176,14 +176,7 @@ class _Builder(ElementTree.TreeBuilder):
 
 
 def parse_robot(path: Path) -> ElementTree.Element:
-    """Return the robot element of a URDF file.
-
-    Raises
-    ------
-    ArgumentError
-        The file cannot be read, is larger than MAX_BYTES, is not well-formed XML, or is not a URDF robot; it has a
-        document type, too deep nesting or a misspelt name.
-    """
+    """Return the robot element of a URDF file; an ArgumentError says what is wrong with the file."""
     try:
         if path.exists() and not path.is_file():
             raise ValueError("no regular file")  # a pipe would be waited for

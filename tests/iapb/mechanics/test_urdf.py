@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -115,7 +114,6 @@ def test_files_that_are_no_urdf_are_refused(tmp_path, text, named):
         Mechanism.from_urdf(path)
 
 
-ROBOTS = Path(__file__).parents[4] / "shared" / "robots"
 ARM_WITH_SHAPES = """<robot name="r"><link name="base">{base}</link>
 <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
   <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>{arm}</link>
@@ -201,14 +199,3 @@ def test_what_the_scene_cannot_hold_is_a_mistake_with_its_place_until_shapes_rep
     lines = "collisions: urdf\n    shapes: {base: [], arm: [{kind: sphere, radius: 0.1}]}"
     file.write_text(SCENE.format(lines=lines))
     assert [len(body.shapes) for body in load_scene(file).bodies] == [0, 1]
-
-
-@pytest.mark.skipif(not (ROBOTS / "allegro_left_hand.urdf").exists(), reason="shared robot files are not here")
-def test_a_hand_of_boxes_and_spheres_falls_on_the_floor(tmp_path: Path) -> None:
-    file = write(tmp_path, BALL, lines="collisions: urdf\n    floating: true\n    origin: [0, 0, 0.15]")
-    shutil.copy(ROBOTS / "allegro_left_hand.urdf", tmp_path / "r.urdf")
-    scene = load_scene(file)
-    assert "rob_link_15_0_tip" in {body.name for body in scene.bodies}  # link_15.0_tip there
-    assert sum(len(body.shapes) for body in scene.bodies) == 21
-    run = simulate(scene, steps=250)
-    assert run.complete and np.diff(run.contacts.offsets).max() > 0
