@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from iapb.schema import Booleans, Floats, Integers, blank, quantities
+from iapb.schema import Booleans, Floats, Integers, zeros_of
 
 
 class MechanismArrays(NamedTuple):
@@ -57,6 +57,6 @@ class Evaluation(NamedTuple):
 
 def make_workspace(bodies: int, dofs: int) -> Workspace:
     """Return scratch for a mechanism with that many bodies and dofs (joints have at most two entries of q per dof)."""
-    made = Workspace(**blank(quantities(Workspace), {"body": bodies, "dof": dofs, "placed": 2 * dofs}))
+    made = zeros_of(Workspace, body=bodies, dof=dofs, placed=2 * dofs)
     made.placed_q[:] = np.nan
     return made
