@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.advice.checks import settled
-from iapb.advice.effects import EFFECT_NAMES, Effect, Facts, active_names, decide_for, facts_of
+from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for, facts_of
 from iapb.compiled import Entry, block, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
