@@ -21,6 +21,7 @@ from verification.claims.conditions import START, Condition, start_conditions
 from verification.claims.peg import place, trace, traces_ahead
 from verification.impacts import Family, Floats, ImpactCase, approaching, draw_of_rank, whole_numbers
 from verification.methods import gram_cholesky, gram_pinv
+from verification.proofs.cases import pseudo_inverse
 from verification.scenes.trace import COORDINATES, Trace
 from verification.table import Row, Table
 
@@ -238,21 +239,6 @@ def _by_pseudo_inverse(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
     change = mass.solve(rows.transpose() * closing).entries()
     after = (_fraction(a) - (1 + e) * _fraction(b) for a, b in zip(v.entries(), change, strict=True))
     return after, exact_impact(*case.arrays, e).velocity
-
-
-def pseudo_inverse(matrix: Any) -> Any:
-    """Return the Moore-Penrose inverse of a rational matrix that is not zero.
-
-    W = C R with the independent columns C and the reduced echelon form R; W† = Rᵀ(R Rᵀ)⁻¹(CᵀC)⁻¹Cᵀ. Source: Ben-Israel
-    and Greville, Generalized Inverses (2003), theorem 1.5 (MacDuffee).
-    """
-    reduced, rank = matrix.rref()
-    make, height, width = type(matrix), matrix.nrows(), matrix.ncols()
-    pivots = [next(j for j in range(width) if reduced[i, j] != 0) for i in range(rank)]
-    columns = make(height, rank, [matrix[i, j] for i in range(height) for j in pivots])
-    echelon = make(rank, width, [reduced[i, j] for i in range(rank) for j in range(width)])
-    left = (columns.transpose() * columns).solve(columns.transpose())
-    return echelon.transpose() * (echelon * echelon.transpose()).solve(left)
 
 
 def _fraction(x: Any) -> Fraction:

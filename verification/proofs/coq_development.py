@@ -31,33 +31,25 @@ KNOWN_AXIOMS = frozenset({
     "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
 STATEMENTS = "Theorems"  # the file with theorems that are also statements of the kernel, by the same names
 NOT_RUN, NO_ANSWER = "not run here", "no answer"
+# Theorem -> digest of its statement (`stated`) and its description; if the statement changes, that is not printed.
 SAYS = {
-    "check_sound": "if the exact checker accepts, wᵀMw ≤ vᵀMv over the real numbers",
-    "check_complete": "if it rejects lists of the right lengths, wᵀMw > vᵀMv",
-    "two_sum_exact": "two_sum(a, b) is a + b exactly, in binary64 with gradual underflow",
-    "two_product_exact": "two_product(a, b) is exactly a b if a b is 0 or its magnitude is at least 2⁻⁹⁶⁹",
-    "two_product_underflow": "two_product(a, b) always differs from a b by at most 7/2 · 2⁻¹⁰⁷⁴",
-    "compensated": "error bound of a double-double sum of n terms, by induction on n",
-    "loop_error": "error and size of either loop of `gain`, a double-double sum of n products of pairs",
-    "gain_error": "error of `gain`: |Γ − (high + low)| is at most the sum of the bounds of its rows and of their sum",
-    "entry_fits": "the terms that the code adds, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), are exact and meet the hypotheses of gain_error",
-    "sign_kept": "if a computed sum is at most 0, the exact sum is at most 0",
-    "accepted_never_gains": "if the computed high + (low + radius) ≤ 0 and the radius bounds the error, then Γ ≤ 0",
-}
-# The digest of each described statement (`stated`): if a statement changes, its English description is not printed.
-STATED = {
-    "check_sound": "a1c099410aa9a793",
-    "check_complete": "307f807fb7ca5381",
-    "two_sum_exact": "da0982301a48a8d2",
-    "two_product_exact": "ab85118807940730",
-    "two_product_underflow": "4fa5b793024e5317",
-    "compensated": "537f5e2556a42bd2",
-    "loop_error": "330c43387117ff63",
-    "gain_error": "3e9e8314039b9603",
-    "entry_fits": "952bdee92e943e09",
-    "sign_kept": "d893e705bea3b779",
-    "accepted_never_gains": "ae6f139f59ee5a76",
-}
+    "check_sound": ("a1c099410aa9a793", "if the exact checker accepts, wᵀMw ≤ vᵀMv over the real numbers"),
+    "check_complete": ("307f807fb7ca5381", "if it rejects lists of the right lengths, wᵀMw > vᵀMv"),
+    "two_sum_exact": ("da0982301a48a8d2", "two_sum(a, b) is a + b exactly, in binary64 with gradual underflow"),
+    "two_product_exact": ("ab85118807940730",
+        "two_product(a, b) is exactly a b if a b is 0 or its magnitude is at least 2⁻⁹⁶⁹"),
+    "two_product_underflow": ("4fa5b793024e5317", "two_product(a, b) always differs from a b by at most 7/2 · 2⁻¹⁰⁷⁴"),
+    "compensated": ("537f5e2556a42bd2", "error bound of a double-double sum of n terms, by induction on n"),
+    "loop_error": ("330c43387117ff63",
+        "error and size of either loop of `gain`, a double-double sum of n products of pairs"),
+    "gain_error": ("3e9e8314039b9603",
+        "error of `gain`: |Γ − (high + low)| is at most the sum of the bounds of its rows and of their sum"),
+    "entry_fits": ("952bdee92e943e09",
+        "the terms that the code adds, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), are exact and meet the hypotheses of gain_error"),
+    "sign_kept": ("d893e705bea3b779", "if a computed sum is at most 0, the exact sum is at most 0"),
+    "accepted_never_gains": ("ae6f139f59ee5a76",
+        "if the computed high + (low + radius) ≤ 0 and the radius bounds the error, then Γ ≤ 0"),
+}  # fmt: skip
 # Text for the report beside the theorems: the rest of the proof that an accepted candidate never gains energy.
 ARGUED = ("Not proved in Coq: the error bound of theorem gain_error is below the radius that the function `gain` "
           "returns (rational arithmetic shows this for each d; the rounding of the radius has an argument in prose). "
@@ -107,7 +99,8 @@ def _answered(name: str) -> tuple[Theorem, ...]:
 def says(name: str) -> str:
     """Return the English description of a theorem, or its Coq statement if that or an earlier definition changed."""
     digest, statement = stated(name)
-    return SAYS[name] if STATED.get(name) == digest else f"changed since it was described: {statement}"
+    described, english = SAYS.get(name, ("", ""))
+    return english if described == digest else f"changed since it was described: {statement}"
 
 
 def stated(name: str) -> tuple[str, str]:

@@ -175,9 +175,10 @@ def fact_line(fact: Fact) -> Line:
 
 def number_line(says: str, left: Fraction, relation: str, right: Fraction) -> Line:
     """Return a comparison of two rationals as a line; a long rational is written as its decimal value."""
-    both = [text if len(text := str(each).replace("-", "−")) <= _LONG else
-            f"{float(each):.6g} (exact rational of {len(text)} characters)" for each in (left, right)]  # fmt: skip
-    return Line(says, f"{both[0]} {relation} {both[1]}")
+    both = [str(each).replace("-", "−") for each in (left, right)]
+    first, second = (each if len(each) <= _LONG else f"{float(value):.6g} (exact rational of {len(each)} characters)"
+                     for each, value in zip(both, (left, right), strict=True))  # fmt: skip
+    return Line(says, f"{first} {relation} {second}")
 
 
 def step_lines(step: Step, reasons: Callable[[Factors], Iterable[Fact]]) -> tuple[Line, ...]:
