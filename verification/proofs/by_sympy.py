@@ -10,6 +10,7 @@ free algebra: a number (a 1 x 1 word) equals its own transpose.
 from __future__ import annotations
 
 import ast
+import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -71,14 +72,8 @@ class Text:
             case ast.BinOp(left, ast.Pow(), ast.Name("T")):
                 value = self.value(left)
                 return value.T if isinstance(value, sympy.MatrixBase) else self.transposed(value)
-            case ast.BinOp(left, ast.Pow(), right):
-                return self.value(left) ** self.value(right)
-            case ast.BinOp(left, ast.Mult(), right):
-                return self.value(left) * self.value(right)
-            case ast.BinOp(left, ast.Div(), right):
-                return self.value(left) / self.value(right)
-            case ast.BinOp(left, ast.Add() | ast.Sub() as sign, right):
-                return _plus(self.value(left), self.value(right) * (1 if isinstance(sign, ast.Add) else -1))
+            case ast.BinOp(left, operation, right):
+                return _OPERATIONS[type(operation)](self.value(left), self.value(right))
             case ast.UnaryOp(ast.USub(), operand):
                 return -self.value(operand)
             case ast.Name(name):
@@ -228,4 +223,7 @@ def _dominating(text: Text, claim: Relation, product: Relation, factor: Relation
             and text.same(factor.value * claim.value - claim.value**2, product.value))  # fmt: skip
 
 
+_OPERATIONS: Mapping[type[ast.operator], Any] = {
+    ast.Add: _plus, ast.Sub: lambda one, other: _plus(one, -other), ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow}  # fmt: skip
 _RULES: Mapping[str, Any] = {"cancelling": _cancelling, "dividing": _dividing, "dominating": _dominating}

@@ -87,11 +87,9 @@ class Expression:
 
     def vanishes(self) -> bool:
         """Whether it is zero in the free algebra, with 1 x 1 words equal to their transposes."""
-        if not (self.rows == self.cols == "1"):
-            return not self.terms
         total: defaultdict[tuple[Scalars, Word], Fraction] = defaultdict(Fraction)
         for (scalars, word), k in self.terms.items():
-            total[scalars, min(word, transposed(word))] += k
+            total[scalars, min(word, transposed(word)) if self.rows == self.cols == "1" else word] += k
         return not any(total.values())
 
     def ordered(self) -> Iterator[tuple[tuple[Scalars, Word], Fraction]]:
@@ -176,7 +174,7 @@ class Fact:
 
 _RELATION = re.compile(r"\s*([=≠≤≥⪯⪰≻])\s*")
 _POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹"
-_ENDS = frozenset(")]=")
+_SIGNS, _ENDS = {"+": 1, "−": -1, "-": -1}, (")", "]", "=", "")
 
 
 class Reader:
@@ -186,7 +184,7 @@ class Reader:
     """
 
     def __init__(self, names: Mapping[str, Expression]) -> None:
-        self.names = dict(names)
+        self.names = {"I": ONE, **names}
         words = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
         self._token = re.compile(rf"\s*({words}|\d+(?:/\d+)?|\S)")
 
@@ -202,61 +200,47 @@ class Reader:
         if relation != "=":
             left, right = (right - left if relation in "≤⪯" else left - right), number(0)
             relation = {"≤": "≥", "⪯": "⪰"}.get(relation, relation)
-        fact = Fact(name or text.strip(), left, relation, right)
-        if relation in "⪰≻" and fact.difference.rows != fact.difference.cols:
+        if relation in "⪰≻" and left.rows != left.cols:
             raise ArgumentError("formula", text, "a square matrix")
-        return fact
+        return Fact(name or text.strip(), left, relation, right)
 
     def products(self, text: str) -> list[tuple[Expression | Fact, ...]]:
         """Return the terms of a sum, each as the factors of its product."""
-        tokens = deque(self._token.findall(text))
-        found = self._sum(tokens)
-        if tokens:
-            raise ArgumentError("formula", text, f"no {tokens[0]} there")
-        return found
+        return self._sum(deque([*self._token.findall(text), ""]), "")
 
-    def _sum(self, tokens: deque[str]) -> list[tuple[Expression | Fact, ...]]:
+    def _sum(self, tokens: deque[str], end: str) -> list[tuple[Expression | Fact, ...]]:
+        """Read up to the token `end`."""
         found: list[tuple[Expression | Fact, ...]] = []
-        while tokens and tokens[0] not in _ENDS:
-            signed = tokens.popleft() if tokens[0] in "+−-" else ""
-            factors: list[Expression | Fact] = [-ONE] if signed and signed != "+" else []
-            start = len(factors)
-            while tokens and tokens[0] not in _ENDS and tokens[0] not in "+−-":
+        while True:
+            sign = _SIGNS[tokens.popleft()] if tokens[0] in _SIGNS else 0
+            factors: list[Expression | Fact] = []
+            while tokens[0] not in _ENDS and tokens[0] not in _SIGNS:
                 factors += self._factor(tokens)
-            if len(factors) == start or (found and not signed):
-                raise ArgumentError("formula", signed, "a product")
-            found.append(tuple(factors))
-        if not found:
-            raise ArgumentError("formula", "", "a sum of products")
-        return found
+            if not factors or (found and not sign):
+                raise ArgumentError("formula", tokens[0], "a sum of products")
+            found.append((*([-ONE] if sign < 0 else []), *factors))
+            if tokens[0] in _ENDS:
+                if (token := tokens.popleft()) != end:
+                    raise ArgumentError("formula", token, f"{end or 'the end'} there")
+                return found
 
     def _factor(self, tokens: deque[str]) -> list[Expression | Fact]:
         token = tokens.popleft()
         if token == "[":
-            left = _total(self._sum(tokens))
-            self._expect("=", tokens)
-            right = _total(self._sum(tokens))
-            self._expect("]", tokens)
-            return [Fact("", left, "=", right)]
+            return [Fact("", _total(self._sum(tokens, "=")), "=", _total(self._sum(tokens, "]")))]
         if token == "(":
-            value = _total(self._sum(tokens))
-            self._expect(")", tokens)
+            value = _total(self._sum(tokens, ")"))
         elif token in self.names:
             value = self.names[token]
-        elif token[0].isdecimal() or token == "I":
-            value = ONE if token == "I" else number(Fraction(token))
+        elif token[0].isdecimal():
+            value = number(Fraction(token))
         else:
             raise ArgumentError("formula", token, f"one of {' '.join(self.names)}")
         times = 1
-        while tokens and (tokens[0] == "ᵀ" or tokens[0] in _POWERS):
+        while tokens[0] and tokens[0] in "ᵀ" + _POWERS:
             mark = tokens.popleft()
             value, times = (value.T, times) if mark == "ᵀ" else (value, times * _POWERS.index(mark))
         return [value] * times
-
-    @staticmethod
-    def _expect(mark: str, tokens: deque[str]) -> None:
-        if not tokens or tokens.popleft() != mark:
-            raise ArgumentError("formula", "", f"a {mark}")
 
 
 def _total(products: Iterable[tuple[Expression | Fact, ...]]) -> Expression:
