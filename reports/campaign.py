@@ -21,9 +21,8 @@ from reports.batches import do_missing, here, processes
 from reports.counterexamples import CampaignRequest, keep_counterexample
 from reports.store.io import mark_store
 from reports.store.tables import Column, Table, read_table, write_table
-from verification.laws.bounds import LawResidual
+from verification.laws.bounds import LawCount, LawResidual
 from verification.laws.campaign import Batch, BatchOutcome, do_batch
-from verification.laws.kit import LawCount, added
 
 _TABLE = "laws"
 _COMMAND = "iapb verify --full"
@@ -72,7 +71,7 @@ class Campaign:
             if self.path_of(batch).is_file():
                 own = sums.setdefault(batch.part, {})
                 for count in _read(self.path_of(batch)):
-                    own[count.law] = added(own[count.law], count) if count.law in own else count
+                    own[count.law] = own[count.law] + count if count.law in own else count
         return sums
 
     def seconds(self, batches: Iterable[Batch]) -> float:

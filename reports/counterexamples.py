@@ -31,9 +31,9 @@ from verification.laws import bounds
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, PARTS, UNEQUAL, Found, Subject, drawn, residuals
 from verification.laws.counterexample import Struck, as_test
-from verification.laws.engine_laws import ENGINE_LAWS
-from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
-from verification.laws.trajectory_laws import judge_run
+from verification.laws.engine import ENGINE_LAWS
+from verification.laws.equality import LAWS, UNEQUAL_LAWS
+from verification.laws.trajectories import judge_run
 
 ENGINE = "iapb:resolve_impact"
 BOUNDS = ("FACTORED", "KIT")  # tolerances, by their names in verification.laws.bounds

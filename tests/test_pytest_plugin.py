@@ -20,7 +20,7 @@ def test_resolve(iapb_law):
     iapb_law(resolve)
 """
 PULLS = "from verification.laws import sound_resolver as resolve\n"
-NEWTON = "from verification.laws.planted_contracts import newton as resolve\n"
+NEWTON = "from tests.verification.laws.faults import newton as resolve\n"
 
 
 def _pytest(folder: Path, *options: str, test: str = USERS_TEST, solver: str = NEWTON) -> tuple[int, str]:

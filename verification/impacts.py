@@ -115,6 +115,14 @@ class ImpactCase:
         return np.divide(self.rows, length, out=np.zeros_like(self.rows), where=length > 0.0)
 
     @cached_property
+    def with_tangents(self) -> ImpactCase:
+        """The case with normals and tangents as its rows, not meant for resolvers; without friction the case itself."""
+        if self.tangents is None:
+            return self
+        rows = np.vstack([self.contact_jacobian, self.tangents.reshape(-1, self.coordinates)])
+        return ImpactCase(self.mass_matrix, rows, self.velocity)
+
+    @cached_property
     def _svd(self) -> tuple[Floats, Floats]:
         _, values, right = np.linalg.svd(self.unit_rows, full_matrices=False)
         return values, right
@@ -247,6 +255,13 @@ def with_unequal_restitution(rng: np.random.Generator, case: ImpactCase) -> Impa
     return replace(case, family=case.family + ", unequal e", unequal=e)
 
 
+def with_spectrum(rng: np.random.Generator, spectrum: Floats) -> Floats:
+    """Return M (…, d, d) with these eigenvalues (…, d) and random axes."""
+    axes = np.linalg.qr(rng.normal(size=(*spectrum.shape, spectrum.shape[-1])))[0]
+    mass = (axes * spectrum[..., None, :]) @ np.swapaxes(axes, -1, -2)
+    return np.asarray(0.5 * (mass + np.swapaxes(mass, -1, -2)))
+
+
 def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: float) -> Floats:
     """Return a symmetric positive definite M (d, d) whose κ is of the order of `condition`."""
     spectrum = condition ** -np.sort(rng.uniform(0.0, 1.0, size=d))
@@ -263,9 +278,7 @@ def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: flo
         mass = np.diag(spectrum)
         mass[0, 1:] = mass[1:, 0] = 0.9 * np.sqrt(spectrum[1:] / d) * rng.choice([-1.0, 1.0], size=d - 1)
         return mass
-    basis = np.linalg.qr(rng.normal(size=(d, d)))[0]
-    mass = basis * spectrum @ basis.T
-    return 0.5 * (mass + mass.T)
+    return with_spectrum(rng, spectrum)
 
 
 def draw_rows(
@@ -422,7 +435,9 @@ def draw_of_rank(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
     """Yield `count` impacts; the same seed gives the same ones."""
     rng = np.random.default_rng([seed, *(round(number) for number in family)])
     for _ in range(count):
-        mass = _mass_of_condition(rng, family.coordinates, family.condition_number)
+        half = 0.5 * np.log10(family.condition_number)
+        spectrum = 10.0 ** np.linspace(-half, half, family.coordinates) if family.coordinates > 1 else np.ones(1)
+        mass = with_spectrum(rng, spectrum)
         velocity = rng.standard_normal(family.coordinates)
         yield ImpactCase(mass, _rows_of_rank(rng, family), velocity, rank=family.rank)
 
@@ -444,15 +459,6 @@ def whole_numbers(family: Family, count: int, seed: int) -> Iterator[ImpactCase]
         velocity = rng.integers(-9, 10, d).astype(np.float64)
         velocity[0] += not velocity.any()
         yield ImpactCase(factor @ factor.T + np.eye(d), _rows_of_rank(rng, family), velocity, rank=family.rank)
-
-
-def _mass_of_condition(rng: np.random.Generator, size: int, condition_number: float) -> Floats:
-    """Return a symmetric positive definite matrix with log-spread eigenvalues between 1/sqrt(κ) and sqrt(κ)."""
-    axes, _ = np.linalg.qr(rng.standard_normal((size, size)))
-    half = 0.5 * np.log10(condition_number)
-    eigenvalues = 10.0 ** np.linspace(-half, half, size) if size > 1 else np.ones(1)
-    mass = (axes * eigenvalues) @ axes.T
-    return 0.5 * (mass + mass.T)
 
 
 def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
@@ -483,9 +489,7 @@ def timed_problems(contacts: int, coordinates: int, seed: int = 0) -> tuple[Impa
 
 def _timed_problem(d: int, c: int, condition: float, closeness: float, e: float, seed: int) -> ImpactCase:
     rng = np.random.default_rng([seed, d, c, int(np.log10(condition)), int(-np.log10(closeness))])
-    axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
-    mass = axes * condition ** -np.linspace(0.0, 1.0, d) @ axes.T
-    mass = 0.5 * (mass + mass.T)
+    mass = with_spectrum(rng, condition ** -np.linspace(0.0, 1.0, d))
     rows = _near_rows(rng, d, c, closeness)
     lower = np.linalg.cholesky(mass)
     whitened = np.linalg.solve(lower, rows.T).T
@@ -514,3 +518,98 @@ def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Fl
         copied = base[: c - half]
         base[half:] = copied + closeness * np.linalg.norm(copied, axis=1)[:, None] * rng.normal(size=(c - half, d))
     return base
+
+
+# Inputs of any size, for the promise that every finite input gives a finite motion or an error by name.
+EXTREME_SIZES = (5e-324, 1e-310, 1e-160, 1e-30, 1.0, 1e30, 1e160, 1.7e308)
+EXTREME_MASSES = ("spectral", "graded", "singular", "indefinite", "asymmetric", "zero")
+EXTREME_ROWS = ("generic", "dependent", "scaled", "copies", "none", "zeros", "huge")
+
+
+def draw_extreme_case(rng: np.random.Generator) -> ImpactCase:
+    """Return M, J and v with magnitudes between the smallest and the largest double; M is not always a mass matrix."""
+    d = int(rng.integers(1, 7))
+    kind, rows_kind = str(rng.choice(EXTREME_MASSES)), str(rng.choice(EXTREME_ROWS))
+    mass = draw_mass_matrix(rng, "graded" if kind == "graded" else "spectral", d, 10.0 ** rng.uniform(0.0, 18.0))
+    if kind == "singular":
+        mass = np.outer(mass[0], mass[0])
+    if kind == "indefinite":
+        mass = mass - 2.0 * np.diag(mass)[rng.integers(d)] * np.eye(d)
+    if kind == "asymmetric":
+        mass = mass + np.triu(rng.normal(size=(d, d)), 1)
+    mass = np.zeros((d, d)) if kind == "zero" else mass
+    rows = draw_rows(rng, "generic" if rows_kind == "huge" else rows_kind, np.eye(d))[0]
+    with np.errstate(over="ignore", under="ignore"):
+        mass, rows, v = (_sized(rng, array) for array in (mass, rows, rng.normal(size=d)))
+    e = float(rng.choice([-1.0, 0.0, 1.0, 0.3]))
+    return ImpactCase(mass, rows, v, e, f"{kind} mass, {rows_kind} rows, extreme sizes")
+
+
+def _sized(rng: np.random.Generator, array: Floats) -> Floats:
+    """Scale the array by one magnitude, or each entry by its own (symmetric for a square array); keep it finite."""
+    sizes = rng.choice(EXTREME_SIZES, size=array.shape) if rng.random() < 0.2 else float(rng.choice(EXTREME_SIZES))
+    if isinstance(sizes, np.ndarray) and array.ndim == 2 and array.shape[0] == array.shape[1]:
+        sizes = np.maximum(sizes, sizes.T)
+    return np.asarray(np.clip(array * sizes, -1.7e308, 1.7e308))
+
+
+# Many impacts of one size, for compiled resolvers: families in which rounding gains most, an ordinary one, and rows of
+# any rank in any metric. Three quarters of the impacts are elastic.
+ADVERSE_FAMILIES = ("ordinary", "light directions", "nearly dependent rows", "M asymmetric in the last bit",
+                    "subnormal velocities", "600 decades")
+ANY_RANK = "any rank"
+_DECADES = {"light directions": 12.0, "nearly dependent rows": 6.0, "M asymmetric in the last bit": 12.0,
+            ANY_RANK: 12.0}
+
+
+class Impacts(NamedTuple):
+    """n impacts of one size."""
+
+    mass: Floats  # (n, d, d)
+    columns: Floats  # (n, d, c) Jᵀ
+    v: Floats  # (n, d)
+    restitution: Floats  # (n,)
+    condition: Floats  # (n,) κ(M) as drawn
+
+
+def draw_impacts(rng: np.random.Generator, family: str, n: int, d: int, c: int) -> Impacts:
+    """Return n impacts of a family; κ(M) is log-uniform up to 10³, 10⁶ or 10¹²."""
+    power = rng.uniform(0.0, _DECADES.get(family, 3.0), n) * (d > 1)
+    mass: Floats = with_spectrum(rng, 10.0 ** (-power[:, None] * np.linspace(0.0, 1.0, d)))
+    e = np.where(rng.random(n) < 0.75, 1.0, rng.uniform(-1.0, 1.0, n))
+    columns: Floats = rng.normal(size=(n, d, c))
+    v: Floats = rng.normal(size=(n, d))
+    if family in ("light directions", "M asymmetric in the last bit"):  # rows random in the kinetic metric
+        values, axes = np.linalg.eigh(mass)
+        columns, v = (axes * np.sqrt(np.abs(values))[:, None, :]) @ columns, axes[:, :, 0]
+    if family == "nearly dependent rows":
+        columns = columns[:, :, :1] + 10.0 ** -rng.uniform(3.0, 14.0, (n, 1, 1)) * columns
+    if family == "M asymmetric in the last bit":
+        moved = np.nextafter(mass, np.where(rng.random((n, d, d)) < 0.5, np.inf, -np.inf))
+        mass = np.where(np.triu(np.ones((d, d), bool), 1), moved, mass)
+    if family == "subnormal velocities":  # small integers times a power of two between 2⁻¹⁰⁷⁴ and 2⁻¹⁰⁵¹
+        v = np.rint(4.0 * v) * np.ldexp(1.0, rng.integers(-1074, -1050, n).astype(np.int32))[:, None]
+    if family == "600 decades":  # the energy fits a double, some products do not
+        unit, speed = 10.0 ** rng.uniform(-75.0, 75.0, (n, d)), 10.0 ** rng.uniform(-75.0, 75.0, (n, 1))
+        mass = mass * unit[:, :, None] * unit[:, None, :] * 10.0 ** rng.uniform(-120.0, 120.0, (n, 1, 1))
+        columns, v = columns * unit[:, :, None], v / unit * speed
+    if family == ANY_RANK:
+        columns, v = _of_any_rank(rng, mass, columns, v)
+    return Impacts(*(np.ascontiguousarray(array) for array in (mass, columns, v, e, 10.0**power)))
+
+
+def _of_any_rank(rng: np.random.Generator, mass: Floats, columns: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Return generic, dependent, copied or nearly dependent rows, and each of rows and v in the kinetic metric or not.
+    """
+    (n, d, c), kind, lower = columns.shape, rng.integers(4), np.linalg.cholesky(mass)
+    rank = int(rng.integers(1, min(max(c, 1), d) + 1))
+    basis, near = rng.normal(size=(n, d, rank)), 10.0 ** -rng.uniform(1.0, 16.0, (n, 1, 1))
+    if kind == 1:
+        columns = basis @ rng.normal(size=(n, rank, c))
+    if kind > 1:
+        columns = basis[:, :, rng.integers(0, rank, size=c)] + (kind == 3) * near * columns
+    if rng.random() < 0.5:
+        columns = lower @ columns
+    if rng.random() < 0.5:
+        v = np.linalg.solve(np.swapaxes(lower, 1, 2), v[:, :, None])[:, :, 0]
+    return columns, v

@@ -16,12 +16,11 @@ from reports.commands.as_json import Json, facts_of, print_json
 from reports.commands.progress import stage_progress
 from reports.counterexamples import ENGINE, CampaignRequest, recheck, recheck_command
 from verification import check_passivity
-from verification.engines import SETTINGS, compare_engines, sentence, verdict
-from verification.engines.record import EngineRecord
+from verification.engines import SETTINGS, EngineRecord, compare_engines, sentence, verdict
 from verification.laws import CONTRACTS
+from verification.laws.bounds import LawCount
 from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
-from verification.laws.kit import LawCount
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M) in tests of the engine, of any other resolver
 LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json

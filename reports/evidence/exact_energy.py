@@ -12,7 +12,8 @@ from iapb.contact.laws import ENGINE_LAWS
 from reports.store.runs import read_run
 from verification.check import Check, Study, Topic
 from verification.finding import NOT_TESTABLE, Part, verdict_of_law
-from verification.laws.exact_energy import FAMILIES, exact_energy
+from verification.impacts import ADVERSE_FAMILIES
+from verification.laws.bulk import exact_energy
 from verification.table import HOLDS, Row, Table
 
 _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
@@ -86,7 +87,7 @@ TOPIC = Topic(
     key="exact-energy", title="Exact energy", question="Does any impact gain energy, even in the last bit?",
     checks=(
         Check(key="certified runs", question="", cases=_runs, row=_certified, says=_recorded_says),
-        Check(key="adverse impacts", question="", cases=lambda study: FAMILIES, row=_drawn, says=_drawn_says,
+        Check(key="adverse impacts", question="", cases=lambda study: ADVERSE_FAMILIES, row=_drawn, says=_drawn_says,
               rule=verdict_of_families, note=_NOTE),
     ),
     says=_answer,

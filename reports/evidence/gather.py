@@ -23,7 +23,7 @@ from verification.cost import study as cost
 from verification.cost.impacts import work_precision
 from verification.finding import Failure, Finding, Table, attempt
 from verification.hard_cases import study as hard_cases
-from verification.laws import study as laws
+from verification.laws import topic as laws
 from verification.proofs import check_all, on_proofs
 from verification.proofs.coq_development import Theorem, theorems
 from verification.proofs.show import ProofRecord
@@ -33,7 +33,7 @@ Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress
 
 # study that draws random numbers -> module with its SEED
 SEEDS = {
-    "claims": "verification.check", "properties": "verification.laws.study",
+    "claims": "verification.check", "properties": "verification.laws.topic",
     "proofs": "verification.proofs.numbers", "robots": "verification.mechanics.against_pinocchio",
     "power balance": "verification.mechanics.power_balance",
     "coordinates": "verification.mechanics.coordinate_invariance",

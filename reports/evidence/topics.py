@@ -10,13 +10,13 @@ from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_o
 
 # key of the finding -> module and name of its topic
 TOPICS: dict[str, str] = {
-    "energy-gains": "verification.laws.study:energy_gains",
-    "properties": "verification.laws.study:properties",
+    "energy-gains": "verification.laws.topic:energy_gains",
+    "properties": "verification.laws.topic:properties",
     "mechanics": "verification.mechanics.mechanics:mechanics",
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
-    "stability": "verification.stability.contact_stability:contact_stability",
+    "stability": "verification.stability.topic:contact_stability",
     "complementarity": "verification.complementarity.complementarity:complementarity",
-    "engines": "verification.engines.verdict:engines",
+    "engines": "verification.engines:engines",
     "haptic-rate": "verification.cost.study:compute",
     "survival": "reports.evidence.survival:compute",
     "exact-energy": "reports.evidence.exact_energy:TOPIC",  # last: it certifies the runs of all others

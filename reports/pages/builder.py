@@ -27,7 +27,7 @@ from reports.pages.terms import explained
 from reports.pages.uses import anchor, runs_by_user
 from verification.claims.peg import FULL
 from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
-from verification.scenes.trace import COORDINATES
+from verification.scenes.measures import COORDINATES
 
 FIRST_PAGE = "report.html"
 # Largest number of table rows, or runs of a claim, on a page, to keep it small; the files beside it have all of them.

@@ -20,7 +20,7 @@ from reports.store.impact import read_broken_impact, write_broken_impact
 from reports.store.tables import read_table
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
-from verification.laws.planted_runs import doubled_impulse
+from verification.laws.planted import doubled_impulse
 
 SOUND = CampaignRequest("verification.laws:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
 BROKEN = replace(SOUND, resolver="verification.laws.planted:wrong_sign")

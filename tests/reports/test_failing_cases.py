@@ -11,6 +11,7 @@ import pytest
 
 from iapb import find_scene
 from reports.runner import Runner
+from verification import check, engines
 from verification.cost import (
     against_mujoco,
     growth,
@@ -22,12 +23,10 @@ from verification.cost import (
     study,
     trajectories,
 )
-from verification.engines import study as engines_study
-from verification.engines.verdict import engines
 from verification.finding import Finding
 from verification.scenes import ledger
-from verification.stability import device_port, maps, peg
-from verification.stability.contact_stability import contact_stability
+from verification.stability import device_port, peg, walls
+from verification.stability.topic import contact_stability
 
 
 def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[..., Any]:
@@ -54,47 +53,47 @@ def nothing(done: int, total: int) -> None:
 
 
 def test_stability(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(maps.GRIDS, "quick", (3, 5))
-    monkeypatch.setattr(maps, "touch_walls", broken(maps.touch_walls, lambda loop, *_: loop.rate == 1000.0 and
-                                                    loop.device_damping == 5.0 and not loop.delay))
-    monkeypatch.setattr(peg, "_contact", broken(peg._contact, lambda device, K, B, run: (K, B, run.world) ==
-                                                (500.0, 50.0, "IAPB") and device == "512 Hz"))
-    monkeypatch.setitem(peg.STIFFNESSES, "quick", (500.0, 1000.0))
+    monkeypatch.setitem(walls.GRIDS, "quick", (3, 5))
+    monkeypatch.setattr(walls, "touch_walls", broken(walls.touch_walls, lambda loop, *_: loop.rate == 1000.0 and
+                                                     not loop.delay and loop.device_damping == 5.0))
+    monkeypatch.setattr(peg, "bounces", broken(peg.bounces, lambda trace: trace.dt == 1.0 / 512.0))
+    monkeypatch.setitem(peg.STIFFNESSES, "quick", (500.0,))
     monkeypatch.setitem(peg.DAMPINGS, "quick", (50.0,))
-    monkeypatch.setattr(peg, "DEVICES", {"512 Hz": peg.DEVICES["512 Hz"]})
-    monkeypatch.setattr(peg, "_pulse", broken(peg._pulse, lambda name, _: name == "brake"))
+    monkeypatch.setattr(peg, "DEVICES", {name: peg.DEVICES[name] for name in ("512 Hz", "1 kHz")})
+    monkeypatch.setattr(peg, "WAVEFORM_RATE", 1000.0)
     monkeypatch.setitem(device_port.WALLS, "quick", (("CBuc", 1e3, 0.0), ("PB", 1e3, 0.0)))
     monkeypatch.setitem(device_port.SPEEDS, "quick", (0.3,))
-    monkeypatch.setattr(device_port, "_worst", broken(device_port._worst, lambda loop, sensors, kind, _: (
-        loop.world, sensors, kind) == ("PB", "late", "presses")))
+    monkeypatch.setattr(device_port, "actuator_forces", broken(device_port.actuator_forces, lambda loop, x: (
+        loop.world == "PB" and loop.delay == 1 and not loop.resolution)))
     topic = contact_stability(Runner(tmp_path), "quick", nothing)
+    loop = "1000 Hz, delay 0, device damping 5 N s/m"
     assert lost(topic) == [
-        "walls at 1000 Hz, delay 0, device damping 5 N s/m", "peg at 512 Hz, K = 500 N/m, B = 50 N s/m",
-        "waveform brake", "hand's port in PB, K = 1000 N/m, B = 0 N s/m, late sensors, the hand presses",
-    ]  # fmt: skip
+        f"maps, {loop}", f"hardness, {loop}", "peg, 512 Hz, 500.0, 50.0",
+        "hand port, PB, 1000.0, 0.0, late, presses", "hand port, PB, 1000.0, 0.0, late, crosses",
+    ]
     assert len(topic.parts) == 9
     assert len(topic.tables["maps"].rows) == 3 * 7 and len(topic.tables["peg"].rows) == 2
-    assert len(topic.tables["hand port"].rows) == 2 * len(device_port.SENSORS) * 2 - 1
+    assert len(topic.tables["hand port"].rows) == 2 * len(device_port.SENSORS) * 2 - 2
 
 
 def test_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(engines_study, "SIMULATORS", ("iapb", "rigid"))
-    monkeypatch.setattr(engines_study, "FIXED_SCENES", ("redundant_wedge", "bernoulli"))
-    monkeypatch.setattr(engines_study, "_both", broken(engines_study._both, lambda name, _, scene, depth: (
+    monkeypatch.setattr(engines, "SIMULATORS", ("iapb", "rigid"))
+    monkeypatch.setattr(engines, "FIXED_SCENES", ("redundant_wedge", "bernoulli"))
+    monkeypatch.setattr(engines, "_both", broken(engines._both, lambda name, scene, depth: (
         name, scene) == ("rigid", "bernoulli")))
-    topic = engines(Runner(tmp_path), "quick", nothing)
-    assert lost(topic) == ["rigid on bernoulli"]
-    assert [row[2] for row in topic.tables["errors"].rows] == ["redundant wedge"] * 2 + ["bernoulli"] * 2 + [
+    topic = engines.engines(Runner(tmp_path), "quick", nothing)
+    assert lost(topic) == ["errors, rigid, bernoulli"]
+    assert topic.tables["errors"].column("scene") == ["redundant wedge"] * 2 + ["bernoulli"] * 2 + [
         "redundant wedge"] * 2
 
 
 def test_scenes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     name, names = "tumbling_body", ("peg_corner", "two_discs", "tumbling_body")
     monkeypatch.setattr(ledger, "scene_names", lambda: names)
-    monkeypatch.setattr(ledger, "find_scene", broken(find_scene, name.__eq__))
+    monkeypatch.setattr(check, "find_scene", broken(find_scene, name.__eq__))
     topic = ledger.scene_ledger(Runner(tmp_path), "quick", nothing)
-    assert lost(topic) == [name]
-    assert [row[0] for row in topic.tables["energy ledger"].rows] == [each for each in names if each != name]
+    assert lost(topic) == [f"{one.key}, {name}" for one in ledger.scene_ledger.checks]
+    assert topic.tables["energy ledger"].column("scene") == [each for each in names if each != name]
     assert len(topic.parts) == 7
 
 

@@ -23,8 +23,9 @@ from verification.cost import effects, impacts
 from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
 from verification.hard_cases import judge
 from verification.hard_cases import study as hard_cases
-from verification.laws import engine_laws, impact_laws, trajectory_laws
-from verification.laws import study as laws
+from verification.laws import engine as engine_laws
+from verification.laws import equality, trajectories
+from verification.laws import topic as laws
 from verification.laws.contracts import CONTRACTS
 
 Patch = pytest.MonkeyPatch
@@ -77,17 +78,18 @@ def of_properties(patch: Patch, folder: Path) -> list[str]:
              "TRAJECTORIES": 2, "IN_SPACE": 0, "TRAJECTORY_STEPS": 5}  # fmt: skip
     for name, size in sizes.items():
         patch.setattr(laws, name, size)
-    impact, engine = next(iter(impact_laws.LAWS)), next(iter(engine_laws.ENGINE_LAWS))
+    impact, engine = next(iter(equality.LAWS)), next(iter(engine_laws.ENGINE_LAWS))
     chosen = {name: engine_laws.ENGINE_LAWS[name] for name in (engine, "budget") if name in engine_laws.ENGINE_LAWS}
     for module in (engine_laws, laws):
         patch.setattr(module, "ENGINE_LAWS", chosen)
-    of_runs = trajectory_laws.TRAJECTORY_LAWS
+    of_runs = trajectories.TRAJECTORY_LAWS
     for found, name in ((CONTRACTS["equality"].laws, impact), (chosen, engine), (of_runs, "finite")):
         patch.setitem(found, name, found[name]._replace(check=broken(found[name].check, lambda *_: True)))
     found = laws.properties(None, "quick", nothing)
-    every = len(impact_laws.LAWS) + len(chosen) + len(of_runs)
+    every = len(equality.LAWS) + len(chosen) + len(of_runs)
     assert len(found.tables["laws"].rows) == every - 3
-    assert [failure.case for failure in found.failures] == [impact, engine, "finite"]
+    assert [failure.case for failure in found.failures] == [
+        f"laws, impact, {impact}", f"laws, engine, {engine}", "laws, trajectory, finite"]
     return ["a law of each kind"]
 
 

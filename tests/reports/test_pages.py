@@ -42,8 +42,7 @@ from verification.finding import (
     titled,
 )
 from verification.hard_cases.study import finding_on, on_hard_cases
-from verification.laws.study import COLUMNS as LAWS
-from verification.laws.study import counterexample
+from verification.laws.topic import counterexample, properties
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -97,10 +96,10 @@ def full() -> Evidence:
         inputs={"arm_energies": arm_energies()},
         claims=(claim, finding_of("C02", "C02", "the same", "no", (Part("n.", REFUTED),))),
         hard_cases=(_hard_case(("factored", "stable", 1e-16)),),
-        counterexamples=(counterexample("gram_pinv", "no gain", "It gains.", (("e", "0.5"),), "assert gain <= 0"),
-                         counterexample("saturate", "passive", "It gains too.", (("M", "[[1]]"),))),
+        counterexamples=(counterexample("gram_pinv", "no gain", "It gains.", {"e": 0.5}, "assert gain <= 0"),
+                         counterexample("saturate", "passive", "It gains too.", {"M": [[1]]})),
         topics=(finding_of("properties", "Energy", "", "It never rises.", (Part("It never rises.", REPRODUCED),),
-                           {"laws": table_of(LAWS, [law])}),
+                           {"laws": properties.checks[0].table_of([law])}),
                 finding_of("mechanics", "Linkages", "Asked <here>.", "All hold.",
                            (Part("It holds to 1e-14.", REPRODUCED),),
                            {"trees": titled(("joints", "error"), ((3, 1e-14),))}),),

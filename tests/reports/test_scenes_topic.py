@@ -6,7 +6,6 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +17,9 @@ from iapb.simulation import simulate
 from reports.evidence.runs import FIGURE_RUNS
 from reports.figures import scenes_ledger, scenes_space
 from reports.figures.geometry import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
-from verification.finding import MIXED, REFUTED, REPRODUCED, Finding
+from verification.finding import MIXED, REFUTED, REPRODUCED, Finding, finding_of
 from verification.scenes import ledger
-from verification.scenes.energy_books import OpenBooks
+from verification.scenes.books import OpenBooks
 
 SPACE = ("peg_hole_space", "arm_obstacles", "tumbling_body")
 NAMES = ("peg_corner", *SPACE)
@@ -31,42 +30,49 @@ def runs() -> tuple[Run, ...]:
     return tuple(simulate(load_scene(find_scene(name)), world="IAPB") for name in NAMES)
 
 
-@pytest.fixture(scope="module")
-def measures(runs: tuple[Run, ...]) -> list[dict[str, Any]]:
-    return [ledger.measure(run) for run in runs]
-
-
 BOOKS = tuple(OpenBooks(name, 1e-3, (1, 2, 4), (0.04, 0.02, 0.01), 1, 1.0) for name in NAMES)
 
 
+def _topic(runs: tuple[Run, ...], books: tuple[OpenBooks, ...] = BOOKS) -> Finding:
+    """The topic made from these runs and residuals."""
+    rows = {"contact": map(ledger.contact_row, runs), "energy ledger": map(ledger.book_row, runs),
+            "what the books leave open": (ledger.open_row(each, (1, 2, 4)) for each in books),
+            "books over time": (row for run in runs for row in ledger.over_time(run))}
+    tables = {check.key: check.table_of(rows[check.key]) for check in ledger.scene_ledger.checks}
+    parts = [part for check in ledger.scene_ledger.checks for part in check.sentences(tables[check.key])]
+    answer = str(ledger.scene_ledger.says(tables, parts))
+    return finding_of("scene-ledger", "The scenes", "", answer, parts, tables)
+
+
 @pytest.fixture(scope="module")
-def topic(runs: tuple[Run, ...], measures: list[dict[str, Any]]) -> Finding:
-    return ledger.finding(measures, BOOKS, [ledger.over_time(runs)])
+def topic(runs: tuple[Run, ...]) -> Finding:
+    return _topic(runs)
 
 
-def test_sentences_say_the_numbers(topic: Finding, measures: list[dict[str, Any]]) -> None:
-    deepest = max(measures, key=lambda m: m["most penetration"])
+def test_sentences_say_the_numbers(topic: Finding) -> None:
+    deepest = max(topic.tables["contact"].records(), key=lambda row: row["most penetration"])
     assert f"{deepest['most penetration']:.2f} mm ({deepest['scene']})" in topic.parts[0].sentence
     assert all(part.sentence.endswith(".") for part in topic.parts)
     assert {part.verdict for part in topic.parts} <= {REPRODUCED, MIXED}
     assert "4 scenes, 3 of them in space" in topic.answer
 
 
-def test_worse_records_are_judged_worse(runs: tuple[Run, ...], measures: list[dict[str, Any]]) -> None:
+def test_worse_records_are_judged_worse(runs: tuple[Run, ...]) -> None:
     impacts = replace(runs[0].impacts, energy_lost=-runs[0].impacts.energy_lost)
-    gaining = ledger.measure(replace(runs[0], impacts=impacts)) | {"how it ends": "stopped: a fault"}
+    gaining = replace(runs[0], impacts=impacts, complete=False, stopped="a fault")
     stuck = tuple(replace(books, order=0.1) for books in BOOKS)
-    outcomes = [part.verdict for part in ledger.finding([gaining, *measures[1:]], stuck, []).parts]
-    assert outcomes[1] == REFUTED and outcomes[2] == MIXED and outcomes[5] == REFUTED
+    outcomes = [part.verdict for part in _topic((gaining, *runs[1:]), stuck).parts]
+    assert outcomes[1] == outcomes[2] == REFUTED and outcomes[3] == MIXED
 
 
-def test_strips_show_every_joule(topic: Finding, measures: list[dict[str, Any]]) -> None:
+def test_strips_show_every_joule(topic: Finding) -> None:
     strips = scenes_ledger.strips(topic.tables["books over time"])
-    for strip, found in zip(strips, measures, strict=True):
+    impacts = topic.tables["contact"].column("impacts")
+    for strip, found, struck in zip(strips, topic.tables["energy ledger"].records(), impacts, strict=True):
         gap = strip.layers.sum(axis=0)[-1] - strip.line[-1]
         left_open = found["residual: motion"] + found["residual: springs"]
         assert gap == pytest.approx(left_open, abs=1e-9 * found["energy exchanged"])
-        assert strip.struck.any() == (found["impacts"] > 0)
+        assert strip.struck.any() == (struck > 0)
         assert not strip.at_rest
 
 

@@ -22,7 +22,7 @@ from verification.claims.peg import place, trace, traces_ahead
 from verification.impacts import Family, Floats, ImpactCase, approaching, draw_of_rank, whole_numbers
 from verification.methods import gram_cholesky, gram_pinv
 from verification.proofs.cases import pseudo_inverse
-from verification.scenes.trace import COORDINATES, Trace
+from verification.scenes.measures import COORDINATES, Trace
 from verification.table import Row, Table
 
 EPSILON = float(np.finfo(np.float64).eps)

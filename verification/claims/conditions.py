@@ -14,7 +14,7 @@ import numpy as np
 
 from iapb.scene import Scene
 from verification.region import Region
-from verification.scenes.trace import HALF_SIZE
+from verification.scenes.measures import HALF_SIZE
 
 UNITS = {
     "tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",

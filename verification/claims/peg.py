@@ -22,6 +22,8 @@ from verification.claims.conditions import (
 )
 from verification.region import Region
 from verification.scenes.measures import (
+    COORDINATES,
+    Trace,
     bounces,
     comparison_window,
     deepest_penetration,
@@ -33,8 +35,8 @@ from verification.scenes.measures import (
     root_mean_square,
     settling_time,
     share_limited,
+    trace_of,
 )
-from verification.scenes.trace import COORDINATES, Trace, trace_of
 from verification.table import Row, Table
 
 # Number of fresh starts that confirm a region. If a tenth of its starts fail, a region is confirmed once in 24 times.

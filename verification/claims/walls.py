@@ -11,11 +11,18 @@ import numpy as np
 from verification.check import Check, Study
 from verification.claims.conditions import DAMPINGS, STIFFNESSES, Condition
 from verification.claims.peg import trace, traces_ahead
-from verification.laws.engine_laws.hand_port import leak, ours, quickest_motion
+from verification.laws.engine import leak, penalty_wall, quickest_motion
 from verification.region import Region
-from verification.scenes.trace import Trace
-from verification.stability.maps import PAPER_DAMPING, StabilityMap, grid, loops, stability_maps, walls
-from verification.stability.sampled_wall import LAWS, PENALTY, touch_walls
+from verification.scenes.measures import Trace
+from verification.stability.walls import (
+    PAPER_DAMPING,
+    PENALTY,
+    StabilityMap,
+    grid,
+    loops,
+    maps_of,
+    touch_walls,
+)
 from verification.table import Row, Table
 
 # C17: the energy lost on impact
@@ -106,8 +113,8 @@ def _leak(study: Study, case: tuple[float, ...]) -> dict[str, Any]:
     turnover = (b + half + B) * float(((motion.readings[1:] - motion.readings[:-1]) ** 2).sum()) * rate
     return {
         "rate [Hz]": rate, "stiffness [N/m]": K, "device damping [of KT/2]": device,
-        "virtual damping [of the bound]": share if b > half else None, "energy from the wall [J]": leak(motion, ours),
-        "wall's turnover [J]": turnover,
+        "virtual damping [of the bound]": share if b > half else None,
+        "energy from the wall [J]": leak(motion, penalty_wall), "wall's turnover [J]": turnover,
     }  # fmt: skip
 
 
@@ -154,8 +161,7 @@ Maps = tuple[StabilityMap, StabilityMap]  # of one loop: with penalties, and wit
 
 
 def _maps(study: Study) -> list[Maps]:
-    maps = {(one.loop, one.law): one for one in stability_maps(study.depth)}
-    return [(maps[loop, LAWS[0]], maps[loop, LAWS[1]]) for loop in loops()]
+    return [maps_of(loop, *grid(study.depth)) for loop in loops()]
 
 
 def _fresh_maps(study: Study, region: Region) -> list[Maps]:
@@ -165,9 +171,7 @@ def _fresh_maps(study: Study, region: Region) -> list[Maps]:
     rng, found = np.random.default_rng(study.seed), []
     for loop in loops():
         fresh = np.array([float(f"{low * (high / low) ** share:.4g}") for share in rng.random(FRESH)])
-        K, B = walls(fresh, damping)
-        penalty, impulses = (StabilityMap(loop, law, fresh, damping, touch_walls(loop, K, B, law)) for law in LAWS)
-        found.append((penalty, impulses))
+        found.append(maps_of(loop, fresh, damping))
     return found
 
 

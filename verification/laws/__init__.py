@@ -4,7 +4,7 @@ from verification.impacts import ImpactCase
 from verification.laws.bounds import LawResidual
 from verification.laws.bulk import BulkImpacts, bulk_impacts
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS, FRICTIONAL_LAWS, UNILATERAL_LAWS
-from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
+from verification.laws.equality import LAWS, UNEQUAL_LAWS
 from verification.laws.kit import PassivityReport, check_passivity
 from verification.laws.planted import PLANTED_BUGS
 from verification.laws.resolver import sound_resolver

@@ -1,15 +1,21 @@
-"""Residuals of the laws, and their tolerances, each with its reason."""
+"""Residuals of the laws, their tolerances, each with its reason, and the tables that hold the laws."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from verification.impacts import ImpactCase
+from iapb.errors import ArgumentError
+from reference.exact import bulk_energy_gain, relative_energy_gain
+from verification.impacts import Floats, ImpactCase
 
 EPS = float(np.finfo(float).eps)
+Measure = TypeVar("Measure", bound=Callable[..., Any])
+Found = tuple[float, float] | None  # value of a residual and its tolerance; None if the law does not apply
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,70 @@ class LawResidual:
     def severe(self) -> bool:
         """Whether rounding cannot explain the failure."""
         return not self.passed and not self.value <= self.excused
+
+
+@dataclass
+class LawCount:
+    """Counts of one law over some cases, updated case by case; `worst` has the largest value / tolerance."""
+
+    law: str
+    checked: int = 0
+    failures: int = 0
+    worst: LawResidual | None = None
+
+    def add(self, residual: LawResidual) -> bool:
+        """Count one case; return whether the law holds in it."""
+        self.checked += 1
+        self.failures += not residual.passed
+        if self.worst is None or (residual.ratio, residual.value) > (self.worst.ratio, self.worst.value):
+            self.worst = residual
+        return residual.passed
+
+    def __add__(self, other: LawCount) -> LawCount:
+        """Return the counts of two sets of cases of one law."""
+        residuals = [count.worst for count in (self, other) if count.worst is not None]
+        worst = max(residuals, key=lambda residual: residual.ratio, default=None)
+        return LawCount(self.law, self.checked + other.checked, self.failures + other.failures, worst)
+
+
+class Law(NamedTuple):
+    """A law: its statement in words and its check, which returns None if the law does not apply.
+
+    The check of a law of impacts takes (ImpactCase, resolver, Bounds), that of a trajectory a `Trajectory`.
+    """
+
+    statement: str
+    check: Callable[..., LawResidual | None]
+
+
+def law(table: dict[str, Law], name: str, statement: str) -> Callable[[Measure], Measure]:
+    """Add the decorated function to a table of laws; it returns a value and its tolerance, or None."""
+
+    def added(measure: Measure) -> Measure:
+        def check(*given: Any) -> LawResidual | None:
+            found = measure(*given)
+            return None if found is None else LawResidual(name, *found)
+
+        table[name] = Law(statement, check)
+        return measure
+
+    return added
+
+
+def relative_gain(mass: Floats, before: Floats, after: Floats) -> float:
+    """Return (KE⁺ − KE⁻)/KE⁻ in double-double or, beyond its range, exactly; infinite if motion begins at rest."""
+    if not before.any():
+        return np.inf if after.any() else 0.0
+    try:
+        gain, bound = bulk_energy_gain(mass, before, after)
+    except ArgumentError:  # numbers below 1e-60 or above 1e60
+        return relative_energy_gain(mass, before, after)
+    return float(gain[0]) if np.isfinite(bound[0]) else np.inf
+
+
+def over(value: Floats, scale: Floats) -> Floats:
+    """value / scale; where the scale is 0, a value above 0 gives infinity, any other 0."""
+    return np.divide(value, scale, out=np.where(value > 0.0, np.inf, 0.0), where=scale > 0.0)
 
 
 @dataclass(frozen=True)

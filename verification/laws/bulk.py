@@ -1,7 +1,7 @@
-"""Many random impacts of one method: relative energy gain compared with 10·d·ε·√κ(M), and the restitution residual.
+"""Very many random impacts: their energy gain against 10·d·ε·√κ(M), and gains judged exactly.
 
-The families are adverse: mass matrices of known spectrum with log-uniform κ, and rows that are random in the metric of
-the coordinates or of the kinetic energy (the latter mix light and heavy motion, so Cholesky's error matters).
+`bulk_impacts` measures one method on impacts of any rank. `exact_energy` checks that no adverse impact gains energy in
+the compiled resolver, and what this guarantee costs.
 """
 
 from __future__ import annotations
@@ -9,25 +9,28 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb import resolve_impact
+from iapb import resolve_impacts
+from iapb.advice.certificate import judge_gains
+from iapb.compiled import block, copy_into, kernel
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
+from iapb.contact.kernels.passive import gain
+from iapb.double_double import kinetic_energies
+from iapb.linalg import cholesky
+from iapb.schema import zeros_of
 from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
-from verification.impacts import ImpactCase
-from verification.laws.impact_laws import restitution_residual
+from verification.impacts import ANY_RANK, Impacts, draw_impacts
+from verification.laws.bounds import EPS, over
 from verification.methods import COMPARED
 
 Floats = NDArray[Any]
 
-VELOCITY_FAMILIES = ("v ~ N(0, I)", "Lᵀv ~ N(0, I)")
-ROW_FAMILIES = ("J ~ N(0, I)", "J L⁻ᵀ ~ N(0, I)")
-LARGEST_COORDINATES, LARGEST_CONTACTS = 30, 100
-EPS = float(np.finfo(float).eps)
-_BATCH = 200  # impacts of one d drawn together
+LARGEST_COORDINATES, LARGEST_CONTACTS, _SIZED = 30, 100, 50  # _SIZED impacts share d, c and the kind of rows
 
 
 @dataclass(frozen=True)
@@ -37,9 +40,8 @@ class BulkImpacts:
     Attributes
     ----------
     method, clamp, seed, seconds : settings of the study, and the time inside the resolver [s].
-    coordinates, contacts, rank : d, c, and the rank that the resolver used.
-    condition : κ(M).  restitution : e.
-    velocity_family, row_family : indices into VELOCITY_FAMILIES and ROW_FAMILIES.
+    coordinates, contacts, rank : d, c, and the rank that the resolver used (NaN if it does not say).
+    condition : κ(M) as drawn.  restitution : e.
     gain : (KE⁺ − KE⁻)/KE⁻ in double-double.  gain_error : error bound of `gain`.
     residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|).
     """
@@ -53,8 +55,6 @@ class BulkImpacts:
     rank: Floats
     condition: Floats
     restitution: Floats
-    velocity_family: Floats
-    row_family: Floats
     gain: Floats
     gain_error: Floats
     residual: Floats
@@ -79,53 +79,17 @@ class BulkImpacts:
         """Number of impacts whose gain exceeds the bound."""
         return int(np.sum(self.gain > self.bound))
 
-    def by_condition(self) -> tuple[BulkRow, ...]:
-        """One row per decade of κ(M)."""
+    def by_condition(self) -> Iterator[tuple[str, int, float, float, float, int, float]]:
+        """Yield one row per decade of κ(M), and one for all: κ from, impacts, and the largest gain, gain / bound,
+        gain / Cholesky's bound, impacts above the bound, and the largest residual.
+        """
         decade = np.floor(np.log10(self.condition) + 1e-9).astype(int)
-        return tuple(self._row(int(k), decade == k) for k in np.unique(decade))
-
-    def by_family(self) -> tuple[tuple[str, str, BulkRow], ...]:
-        """One row per pair of velocity family and row family."""
-        return tuple(
-            (velocity, rows, self._row(-1, (self.velocity_family == i) & (self.row_family == j)))
-            for i, velocity in enumerate(VELOCITY_FAMILIES)
-            for j, rows in enumerate(ROW_FAMILIES)
-        )
-
-    def _row(self, decade: int, chosen: Floats) -> BulkRow:
-        ratio = self.gain[chosen] / self.bound[chosen]
-        return BulkRow(
-            decade,
-            int(np.sum(chosen)),
-            float(np.max(self.gain[chosen], initial=-np.inf)),
-            float(np.max(ratio, initial=-np.inf)),
-            int(np.sum(ratio > 1.0)),
-            float(np.max(self.gain[chosen] / self.cholesky_bound[chosen], initial=-np.inf)),
-            float(np.median(self.residual[chosen])) if np.any(chosen) else np.nan,
-            float(np.max(self.residual[chosen], initial=0.0)),
-        )
-
-
-@dataclass(frozen=True)
-class BulkRow:
-    """Summary of the impacts with κ(M) in [10^decade, 10^(decade + 1)); decade −1 stands for any κ(M)."""
-
-    decade: int
-    impacts: int
-    worst_gain: float
-    worst_gain_over_bound: float
-    above_bound: int
-    worst_gain_over_cholesky_bound: float
-    median_residual: float
-    worst_residual: float
-
-
-class _Batch(NamedTuple):
-    """Impacts of one d, and the family indices of each impact."""
-
-    cases: list[ImpactCase]
-    velocity_family: Floats
-    row_family: Floats
+        groups = [(f"1e{k}", decade == k) for k in np.unique(decade)]
+        for name, chosen in [*groups, ("all", decade == decade)]:
+            ratio, gains = (self.gain / self.bound)[chosen], self.gain[chosen]
+            yield (name, int(np.sum(chosen)), float(np.max(gains)), float(np.max(ratio)),
+                   float(np.max(gains / self.cholesky_bound[chosen])), int(np.sum(ratio > 1.0)),
+                   float(np.max(self.residual[chosen])))
 
 
 def bulk_impacts(
@@ -133,16 +97,14 @@ def bulk_impacts(
     seed: int = 0,
     method: str = "factored",
     clamp: bool | None = None,
-    largest_condition: float = 1e12,
     progress: Callable[[int, int], None] | None = None,
 ) -> BulkImpacts:
-    """Resolve `impacts` random impacts (d 1…30, c 0…100, rank deficient, e in [−1, 1]) and measure each.
+    """Resolve `impacts` random impacts (d 1…30, c 0…100, any rank, κ(M) up to 1e12, e in [−1, 1]) and measure each.
 
     Parameters
     ----------
     impacts, seed : number of impacts, and seed of the random numbers.
     method, clamp : "factored", with or without the clamp of `iapb.resolve_impact`, or a name of `COMPARED`.
-    largest_condition : κ(M) is log-uniform up to it.
     progress : called with (done, impacts) after each batch.
 
     Returns
@@ -150,89 +112,137 @@ def bulk_impacts(
     BulkImpacts
         one value per impact: sizes, κ(M), relative energy gain, its bound, and more.
     """
-    columns: dict[str, list[Floats]] = {}
-    seconds, done = 0.0, 0
+    rng, columns, seconds = np.random.default_rng(seed), dict[str, list[Floats]](), 0.0
     with one_thread():
-        for batch in _batches(np.random.default_rng(seed), impacts, largest_condition):
+        for start in range(0, impacts, _SIZED):
+            n, d = min(_SIZED, impacts - start), int(rng.integers(1, LARGEST_COORDINATES + 1))
+            given = draw_impacts(rng, ANY_RANK, n, d, int(rng.integers(0, LARGEST_CONTACTS + 1)))
             started = time.perf_counter()
-            v_plus, rank = _resolve(batch, method, clamp)
+            v_plus, rank = _resolve(given, method, clamp)
             seconds += time.perf_counter() - started
-            for name, values in _measure(batch, v_plus, rank).items():
+            for name, values in _measure(given, v_plus, rank).items():
                 columns.setdefault(name, []).append(values)
-            done += len(rank)
             if progress is not None:
-                progress(done, impacts)
+                progress(start + n, impacts)
     return BulkImpacts(method, clamp, seed, seconds, **{name: np.concatenate(x) for name, x in columns.items()})
 
 
-def _resolve(batch: _Batch, method: str, clamp: bool | None) -> tuple[Floats, Floats]:
-    """v⁺ (n, d) and rank (n,), NaN if the method does not say."""
-    if method != "factored":
-        velocities = [COMPARED[method](*case.arrays, case.restitution) for case in batch.cases]
-        return np.array(velocities), np.full(len(velocities), np.nan)
-    found = [resolve_impact(*case.arrays, case.restitution, clamp=clamp) for case in batch.cases]
-    return np.array([impact.velocity for impact in found]), np.array([float(impact.rank) for impact in found])
+def _resolve(given: Impacts, method: str, clamp: bool | None) -> tuple[Floats, Floats]:
+    rows = given.columns.transpose(0, 2, 1)
+    if method == "factored":
+        found = resolve_impacts(given.mass, rows, given.v, given.restitution, clamp=clamp)
+        return found.velocity, found.rank
+    v_plus = np.array([COMPARED[method](*impact) for impact in zip(given.mass, rows, *given[2:4], strict=True)])
+    return v_plus, np.full(len(v_plus), np.nan)
 
 
-def _measure(batch: _Batch, v_plus: Floats, rank: Floats) -> dict[str, Floats]:
-    masses = np.array([case.mass_matrix for case in batch.cases])
-    gain, error = bulk_energy_gain(masses, np.array([case.velocity for case in batch.cases]), v_plus)
-    eigenvalues = np.linalg.eigvalsh(masses)
+def _measure(given: Impacts, v_plus: Floats, rank: Floats) -> dict[str, Floats]:
+    (n, d, c), lower = given.columns.shape, np.linalg.cholesky(given.mass)
+    gains, error = bulk_energy_gain(given.mass, given.v, v_plus)
+    target = v_plus + given.restitution[:, None] * given.v
+    length = np.linalg.norm(np.linalg.solve(lower, given.columns), axis=1)
+    speed = np.linalg.norm(np.einsum("nij,ni->nj", lower, given.v), axis=1)
+    unmet = over(np.abs(np.einsum("nic,ni->nc", given.columns, target)), length * speed[:, None])
     return {
-        "coordinates": np.full(len(masses), masses.shape[1]),
-        "contacts": np.array([case.contacts for case in batch.cases]),
-        "rank": rank,
-        "condition": eigenvalues[:, -1] / eigenvalues[:, 0],
-        "restitution": np.array([case.restitution for case in batch.cases]),
-        "velocity_family": batch.velocity_family,
-        "row_family": batch.row_family,
-        "gain": gain,
-        "gain_error": error,
-        "residual": np.array([restitution_residual(*pair) for pair in zip(batch.cases, v_plus, strict=True)]),
+        "coordinates": np.full(n, d), "contacts": np.full(n, c), "rank": rank, "condition": given.condition,
+        "restitution": given.restitution, "gain": gains, "gain_error": error,
+        "residual": np.max(unmet, axis=1, initial=0.0),
     }
 
 
-def _batches(rng: np.random.Generator, impacts: int, largest_condition: float) -> Iterator[_Batch]:
-    left = impacts
-    while left > 0:
-        n = min(left, _BATCH)
-        yield _draw(rng, n, int(rng.integers(1, LARGEST_COORDINATES + 1)), largest_condition)
-        left -= n
+LARGEST = 8  # coordinates, and contacts, of the impacts judged exactly
+LEAST_MOVED = 0.9  # share of a family's impacts that must change v; otherwise "none gains" is no evidence
+SCALED = ("600 decades",)  # scaled as in `resolve_impact`; the other families stay in their units, as in compiled steps
+_BATCH = 5000
 
 
-def _draw(rng: np.random.Generator, n: int, d: int, largest_condition: float) -> _Batch:
-    masses = _masses(rng, n, d, largest_condition)
-    lower = np.linalg.cholesky(masses)
-    velocity_family = rng.integers(0, len(VELOCITY_FAMILIES), size=n)
-    row_family = rng.integers(0, len(ROW_FAMILIES), size=n)
-    v = rng.normal(size=(n, d))
-    whitened = np.linalg.solve(np.swapaxes(lower, 1, 2), v[:, :, None])[:, :, 0]
-    jacobians = [_rows(rng, d) @ (lower[k].T if row_family[k] else np.eye(d)) for k in range(n)]
-    e = np.where(rng.random(n) < 0.3, rng.choice([-1.0, 0.0, 1.0], size=n), rng.uniform(-1.0, 1.0, size=n))
-    velocities = np.where(velocity_family[:, None] == 1, whitened, v)
-    cases = [ImpactCase(*impact) for impact in zip(masses, jacobians, velocities, e.tolist(), strict=True)]
-    return _Batch(cases, velocity_family, row_family)
+@dataclass(frozen=True)
+class ExactEnergy:
+    """Result for the impacts of one family.
+
+    Attributes
+    ----------
+    family : name of the family.
+    impacts, gains : number of impacts, and number of those that gained energy in exact arithmetic.
+    moved : share of the impacts with v⁺ ≠ v⁻.
+    cancelled : number of impacts without any passive step, for which v⁺ = v⁻.
+    price : 0.5, 0.99 and 1-quantiles, over the impacts with e = 1, of the relative energy that passivity costs. The
+        cost is the loss beyond that of the same impact without clamp and last step, in units of 10 d ε √κ(M).
+    """
+
+    family: str
+    impacts: int
+    gains: int
+    moved: float
+    cancelled: int
+    price: tuple[float, float, float]
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether no impact gained energy; None if too few impacts changed v for a conclusion."""
+        return False if self.gains else True if self.moved >= LEAST_MOVED else None
 
 
-def _masses(rng: np.random.Generator, n: int, d: int, largest_condition: float) -> Floats:
-    """Draw M with random orthogonal axes, a log-uniform spectrum between 1 and 1/κ, log-uniform κ and a random unit."""
-    axes = np.linalg.qr(rng.normal(size=(n, d, d)))[0]
-    exponent = rng.uniform(0.0, np.log10(largest_condition), size=(n, 1))
-    share = rng.uniform(0.0, 1.0, size=(n, d))
-    share[:, 0], share[:, -1] = 0.0, 1.0
-    masses = (axes * (10.0 ** -(exponent * share))[:, None, :]) @ np.swapaxes(axes, 1, 2)
-    return 0.5 * (masses + np.swapaxes(masses, 1, 2)) * 10.0 ** rng.uniform(-3.0, 3.0, size=(n, 1, 1))
+def exact_energy(family: str, impacts: int, seed: int = 0) -> ExactEnergy:
+    """Draw and resolve the impacts of one of `impacts.ADVERSE_FAMILIES`, and check each for an energy gain."""
+    rng, gains, moved, cancelled = np.random.default_rng([seed, *family.encode()]), 0, 0, 0
+    prices: list[Any] = []
+    for start in range(0, impacts, _BATCH):
+        d, c = (int(rng.integers(1, LARGEST + 1)) for _ in range(2))
+        with np.errstate(over="ignore", under="ignore"):
+            given = draw_impacts(rng, family, min(_BATCH, impacts - start), d, c)
+        v_plus, clamps = resolved(given, scale=family in SCALED)
+        gains += int(judge_gains(given.mass, given.v, v_plus).gained.sum())
+        moved += int((v_plus != given.v).any(axis=1).sum())
+        cancelled += int((clamps <= 0.0).sum())
+        if family not in ("subnormal velocities", "600 decades"):
+            prices.append(_losses(given, v_plus) - np.maximum(_losses(given, resolved(given, False)[0]), 0.0))
+    median, most, largest = np.quantile(np.concatenate(prices), (0.5, 0.99, 1.0)) if prices else np.full(3, np.nan)
+    return ExactEnergy(family, impacts, gains, moved / impacts, cancelled, (float(median), float(most), float(largest)))
 
 
-def _rows(rng: np.random.Generator, d: int) -> Floats:
-    """Draw c rows of random rank: generic, dependent, copies, or dependent up to a distance of 1e-1 … 1e-16."""
-    c = int(rng.integers(0, LARGEST_CONTACTS + 1))
-    kind = rng.integers(0, 4)
-    rank = int(rng.integers(1, min(max(c, 1), d) + 1))
-    if kind == 0:
-        return rng.normal(size=(c, d))
-    basis = rng.normal(size=(rank, d))
-    if kind == 1:
-        return rng.normal(size=(c, rank)) @ basis
-    copies = basis[rng.integers(0, rank, size=c)]
-    return copies if kind == 2 else copies + 10.0 ** -rng.uniform(1.0, 16.0) * rng.normal(size=(c, d))
+def resolved(given: Impacts, clamped: bool = True, *, scale: bool = False) -> tuple[Floats, Floats]:
+    """Return v⁺ (n, d) and the clamps (n,), by the engine's impact kernel as the simulation step calls it.
+
+    If M is not positive definite to rounding, v⁺ = v and the clamp is −1. `scale` applies powers of two before and
+    after, like `resolve_impact`.
+    """
+    if scale:
+        found = resolve_impacts(given.mass, given.columns.transpose(0, 2, 1), given.v, given.restitution, clamp=clamped)
+        return found.velocity, found.clamp
+    d, c = given.columns.shape[1:]
+    v_plus, clamps = np.empty_like(given.v), np.empty(len(given.v))
+    work = block(zeros_of(ImpactWork, velocity=d, row=c))
+    _resolve_all(*given[:4], clamped, np.empty((d, d)), work, np.empty(d), v_plus, clamps)
+    return v_plus, clamps
+
+
+@kernel
+def _resolve_all(mass, columns, v, restitution, clamped, lower, work, momentum, v_plus, clamps):  # type: ignore[no-untyped-def]
+    n, d, c = columns.shape
+    for k in range(n):
+        for i in range(d):
+            for j in range(c):
+                work.columns[i, j] = columns[k, i, j]
+        if cholesky(mass[k], lower) != 0:
+            clamps[k] = -1.0
+            copy_into(v_plus[k], v[k])
+            continue
+        clamps[k] = factored_impact(mass[k], lower, v[k], restitution[k], c, rank_tolerance(lower), d, clamped, work,
+                                    v_plus[k], momentum)[1]
+
+
+@kernel
+def _relative_losses(masses, v, v_plus, lost):  # type: ignore[no-untyped-def]
+    """Write (KE⁻ − KE⁺)/KE⁻, computed in double-double and rounded once, into `lost`."""
+    for k in range(v.shape[0]):
+        high, low, _, _ = gain(masses[k], v[k], v_plus[k])
+        lost[k] = -0.25 * (high + low) / kinetic_energies(masses[k], v[k], v_plus[k])[0]
+
+
+def _losses(given: Impacts, v_plus: Floats) -> Floats:
+    """Return the relative losses of the elastic impacts, divided by 10 d ε √κ."""
+    lost, elastic = np.empty(len(v_plus)), given.restitution == 1.0
+    _relative_losses(given.mass, given.v, v_plus, lost)
+    bound = 10.0 * v_plus.shape[1] * EPS * np.sqrt(given.condition)
+    return np.asarray((lost / bound)[elastic], np.float64)

@@ -17,14 +17,14 @@ from iapb.errors import IapbError
 from iapb.run import Run
 from reference.one_thread import one_thread
 from verification.impacts import draw_case, with_unequal_restitution
-from verification.laws.bounds import Bounds, LawResidual
+from verification.laws.bounds import Bounds, LawCount, LawResidual
 from verification.laws.counterexample import Struck, strike
-from verification.laws.engine_laws import ENGINE_LAWS
-from verification.laws.impact_laws import LAWS, OF_ONE_CALL, UNEQUAL_LAWS
-from verification.laws.kit import LawCount, RunningCount, residual_of
+from verification.laws.engine import ENGINE_LAWS
+from verification.laws.equality import LAWS, OF_ONE_CALL, UNEQUAL_LAWS
+from verification.laws.kit import residual_of
 from verification.laws.resolver import Resolver
 from verification.laws.scenes import draw_scene, draw_spatial_scene
-from verification.laws.trajectory_laws import judge_run
+from verification.laws.trajectories import judge_run
 
 IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = "impacts", "unequal restitution", "trajectories", "trajectories in space"
 PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS, IN_SPACE)  # the seeds depend on the order: add at the end
@@ -139,18 +139,17 @@ def residuals(
 
 def do_batch(batch: Batch, subject: Subject, progress: Callable[[int], None] | None = None) -> BatchOutcome:
     """Check every case of a batch against the laws of its part."""
-    started, counts, found = time.perf_counter(), dict[str, RunningCount](), list[Found]()
+    started, counts, found = time.perf_counter(), dict[str, LawCount](), list[Found]()
     with one_thread():
         for index in range(batch.first, batch.first + batch.count):
             case = drawn(batch.part, index, subject)
             results, run = residuals(batch.part, case, subject, index)
             for law, residual in results.items():
-                kept = counts.setdefault(law, RunningCount()).add(residual)
+                kept = counts.setdefault(law, LawCount(law)).add(residual)
                 if not kept and sum(one.law == law for one in found) < STORED_PER_LAW:
                     struck = strike(batch.part, case, subject.resolver)
                     # replace() makes a copy without the cached answers of the laws
                     found.append(Found(law, batch.part, index, residual, replace(case), run, struck))
             if progress is not None:
                 progress(index + 1 - batch.first)
-    counted = tuple(running.count(law) for law, running in counts.items())
-    return BatchOutcome(counted, tuple(found), time.perf_counter() - started)
+    return BatchOutcome(tuple(counts.values()), tuple(found), time.perf_counter() - started)

@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iapb.advice.certificate import relative_gain
+from iapb.advice import certificate
 from verification.impacts import (
     Floats,
     ImpactCase,
@@ -42,13 +42,17 @@ from verification.impacts import (
     draw_one_sided_case,
     draw_wide_case,
 )
-from verification.laws.bounds import KIT, ONE_SIDED, Bounds, LawResidual
-from verification.laws.impact_laws import LAWS, Law, elastic_conserves
+from verification.laws.bounds import KIT, ONE_SIDED, Bounds, Found, Law, LawResidual, law
+from verification.laws.equality import LAWS, elastic_conserves
 from verification.laws.resolver import Resolver, least_push, outcome, own_outcome
 
 TOUCHING = 1e-12  # relative to ‖Aᵢ‖ |u|: a smaller normal velocity counts as zero
 CLEAR = 0.05  # least singular value of one contact's unit rows, for laws that need its impulse
 _REFINEMENTS, NEAR = 30, 1e-9  # searches for the direction of friction in a cone, and the distance that ends them
+
+UNILATERAL_LAWS: dict[str, Law] = {name: LAWS[name] for name in ("kinetic_energy", "impulse_range")}
+FRICTIONAL_LAWS: dict[str, Law] = UNILATERAL_LAWS | {
+    "impulse_range": Law("M(v⁺ − v⁻) lies in range([Jᵀ Tᵀ])", LAWS["impulse_range"].check)}
 
 
 def _normal_velocities(case: ImpactCase, velocity: Floats) -> Floats:
@@ -56,6 +60,11 @@ def _normal_velocities(case: ImpactCase, velocity: Floats) -> Floats:
     gamma, scale = case.contact_jacobian @ velocity, np.linalg.norm(case.rows, axis=1) * case.speed
     appeared = np.where(gamma == 0.0, 0.0, np.copysign(np.inf, gamma))
     return np.divide(gamma, scale, out=appeared, where=scale > 0.0)
+
+
+def _before_and_after(case: ImpactCase, resolver: Resolver) -> tuple[Floats, Floats]:
+    """γ⁻ and γ⁺, each (c,), relative to ‖Aᵢ‖ |u⁻|."""
+    return _normal_velocities(case, case.velocity), _normal_velocities(case, own_outcome(resolver, case))
 
 
 def _all_approach(case: ImpactCase) -> bool:
@@ -67,35 +76,18 @@ def _change(case: ImpactCase, resolver: Resolver) -> Floats:
     return case.lower.T @ (own_outcome(resolver, case) - case.velocity)
 
 
-def _with_tangents(case: ImpactCase) -> ImpactCase:
-    """Return the case with normals and tangents as its rows; it is not meant for resolvers."""
-    if case.tangents is None:
-        return case
-    rows = np.vstack([case.contact_jacobian, case.tangents.reshape(-1, case.coordinates)])
-    return ImpactCase(case.mass_matrix, rows, case.velocity)
+@law(UNILATERAL_LAWS, "pushing", "M(v⁺ − v⁻) = Jᵀp with p ≥ 0: no contact pulls")
+@law(FRICTIONAL_LAWS, "cone", "M(v⁺ − v⁻) = Jᵀp + Tᵀp_t with |p_t| ≤ μ p at every contact")
+def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """Distance of Δu, projected on the span of the rows, from {Aᵀp : p ≥ 0}; with friction from the sum of cones.
 
-
-# (9): M(v⁺ − v⁻) = Jᵀp + Tᵀp_t for some p and p_t.
-def impulse_comes_from_the_contacts(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Part of Δu outside the span of the contacts' rows, relative to |u|."""
-    every = _with_tangents(case)
+    p is not unique, so the law holds if any such p explains the motion.
+    """
+    every = case.with_tangents
     if not every.is_separated or case.speed == 0.0:
         return None
-    change = _change(case, resolver)
-    outside = change - every.row_space.T @ (every.row_space @ change)
-    return LawResidual("impulse_range", float(np.linalg.norm(outside)) / case.speed, bounds.comparison(every))
-
-
-# p ≥ 0, and |p_t| ≤ μ p: p is not unique, so the law holds if any such p explains the motion.
-def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Distance of Δu, projected on the span of the rows, from {Aᵀp : p ≥ 0}; with friction from the sum of cones."""
-    every = _with_tangents(case)
-    if not every.is_separated or case.speed == 0.0:
-        return None
-    change = _change(case, resolver)
-    seen = every.row_space.T @ (every.row_space @ change)
-    name = "pushing" if case.tangents is None else "cone"
-    return LawResidual(name, distance_from_cone(case, seen / case.speed), bounds.restitution)
+    seen = every.row_space.T @ (every.row_space @ _change(case, resolver))
+    return distance_from_cone(case, seen / case.speed), bounds.restitution
 
 
 def distance_from_cone(case: ImpactCase, target: Floats) -> float:
@@ -131,39 +123,36 @@ def _friction(case: ImpactCase) -> tuple[Floats, Floats]:
     return np.linalg.solve(case.lower, flat.T).T.reshape(case.tangents.shape), case.friction
 
 
-# For any law of restitution: approaching contacts stop approaching, and no separating one approaches faster than e γ⁻.
-def nothing_is_driven_in(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """Largest of min(0, −e γ⁻) − γ⁺, relative to ‖Aᵢ‖ |u|."""
-    before, after = (_normal_velocities(case, v) for v in (case.velocity, own_outcome(resolver, case)))
-    short = np.minimum(0.0, -case.restitution * before) - after
-    return LawResidual("no_penetration", float(np.max(short, initial=0.0)), bounds.restitution)
+@law(UNILATERAL_LAWS, "no_penetration", "γ⁺ ≥ min(0, −e γ⁻): no contact is left approaching")
+def nothing_is_driven_in(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """Largest of min(0, −e γ⁻) − γ⁺, relative to ‖Aᵢ‖ |u|, for any law of restitution."""
+    before, after = _before_and_after(case, resolver)
+    return float(np.max(np.minimum(0.0, -case.restitution * before) - after, initial=0.0)), bounds.restitution
 
 
-# Newton's inequality; Poisson's law with one e satisfies it, too, if every contact approaches.
-def restitution_is_met_or_exceeded(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """Largest of −e γ⁻ − γ⁺, relative to ‖Aᵢ‖ |u|, if every contact approaches."""
+@law(UNILATERAL_LAWS, "restitution", "γ⁺ ≥ −e γ⁻ where every contact approaches")
+def restitution_is_met_or_exceeded(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """Largest of −e γ⁻ − γ⁺, relative to ‖Aᵢ‖ |u|: Newton's inequality, which Poisson's law with one e keeps, too."""
     if not _all_approach(case):
         return None
-    before, after = (_normal_velocities(case, v) for v in (case.velocity, own_outcome(resolver, case)))
-    short = -case.restitution * before - after
-    return LawResidual("restitution", float(np.max(short, initial=0.0)), bounds.restitution)
+    before, after = _before_and_after(case, resolver)
+    return float(np.max(-case.restitution * before - after, initial=0.0)), bounds.restitution
 
 
-# pᵀ(γ⁺ + e γ⁻) = Δu·(u⁺ + e u⁻): this sum of terms ≥ 0 is known without p, which redundant rows do not determine.
-def pushing_contacts_meet_restitution(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """|Δu·(u⁺ + e u⁻)| / |u⁻|², if every contact approaches."""
+@law(UNILATERAL_LAWS, "complementarity", "p ⟂ γ⁺ + e γ⁻ where every contact approaches")
+def pushing_contacts_meet_restitution(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """|pᵀ(γ⁺ + e γ⁻)| / |u⁻|² = |Δu·(u⁺ + e u⁻)| / |u⁻|²: known without p, which redundant rows do not determine."""
     if not _all_approach(case) or case.speed == 0.0:
         return None
     u, change = case.lower.T @ case.velocity, _change(case, resolver)
     value = abs(float(change @ (change + (1.0 + case.restitution) * u))) / case.speed**2
-    return LawResidual("complementarity", value, 2.0 * bounds.restitution)
+    return value, 2.0 * bounds.restitution
 
 
-# If some contacts approach and others separate, Newton's and Poisson's v⁺ differ; each is unique (a projection).
-def mixed_impacts_follow_newton_or_poisson(
-    case: ImpactCase, resolver: Resolver, bounds: Bounds
-) -> LawResidual | None:
-    """Smaller of the distances of v⁺ from Newton's and from Poisson's v⁺, if only some contacts approach."""
+@law(UNILATERAL_LAWS, "mixed_restitution",
+     "v⁺ is Newton's or Poisson's where some contacts approach and others separate")
+def mixed_impacts_follow_newton_or_poisson(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """Smaller of the distances of v⁺ from Newton's and from Poisson's v⁺; each of these is unique (a projection)."""
     before = _normal_velocities(case, case.velocity)
     if not case.is_separated or case.speed == 0.0 or not np.any(before < -TOUCHING) or not np.any(before > TOUCHING):
         return None
@@ -172,19 +161,27 @@ def mixed_impacts_follow_newton_or_poisson(
     poisson = newton + rows.T @ least_push(rows, -newton)
     found = case.lower.T @ own_outcome(resolver, case)
     nearer = min(float(np.linalg.norm(found - answer)) for answer in (newton, poisson))
-    return LawResidual("mixed_restitution", nearer / case.speed, max(bounds.restitution, bounds.comparison(case)))
+    return nearer / case.speed, max(bounds.restitution, bounds.comparison(case))
 
 
-def separating_contacts_do_nothing(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
+@law(UNILATERAL_LAWS, "separating", "where no contact approaches v is left as it is")
+def separating_contacts_do_nothing(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """Distance of v⁺ from v⁻ after the normals are turned so that no contact approaches."""
     J = case.contact_jacobian
     v_plus = outcome(resolver, replace(case, contact_jacobian=np.where((J @ case.velocity < 0.0)[:, None], -J, J)))
-    return LawResidual("separating", case.distance(v_plus, case.velocity), bounds.restitution)
+    return case.distance(v_plus, case.velocity), bounds.restitution
 
 
-def elastic_approach_conserves(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
-    """|KE⁺ − KE⁻| / KE⁻ with e = 1, if every contact approaches."""
+@law(UNILATERAL_LAWS, "elastic", "e = 1 conserves KE where every contact approaches")
+def elastic_approach_conserves(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """|KE⁺ − KE⁻| / KE⁻ with e = 1."""
     return elastic_conserves(case, resolver, bounds) if _all_approach(case) else None
+
+
+FRICTIONAL_LAWS |= {name: UNILATERAL_LAWS[name] for name in ("no_penetration", "restitution", "separating")}
+# Laws that compare two calls: v⁺ of contacts that only push is unique, even if p is not.
+_UNIQUE = ("free_motion", "momentum", "duplicated_rows", "row_order", "units", "coordinates", "groups")
+UNILATERAL_LAWS |= {name: LAWS[name] for name in (*_UNIQUE, "repeatability", "arguments")}
 
 
 # Friction without restitution, at a single contact or at all contacts together.
@@ -198,6 +195,16 @@ class _Tried(NamedTuple):
     friction: Floats
 
 
+def _tried(case: ImpactCase) -> _Tried | None:
+    """The case with its rows and W; None if the rows are too close to dependent to determine the impulses."""
+    every = case.with_tangents
+    if case.friction is None or every.contacts > case.coordinates:
+        return None
+    if np.linalg.svd(every.unit_rows, compute_uv=False)[-1] < CLEAR:
+        return None
+    return _Tried(case, every.contact_jacobian, every.rows, every.rows @ every.rows.T, case.friction)
+
+
 def _single(case: ImpactCase) -> _Tried | None:
     """The first contact alone; None if it hardly approaches or its rows are too close to dependent."""
     if case.tangents is None or case.friction is None or case.contacts == 0 or case.speed == 0.0:
@@ -207,17 +214,14 @@ def _single(case: ImpactCase) -> _Tried | None:
     return None if _normal_velocities(alone, case.velocity)[0] > -CLEAR else _tried(alone)
 
 
-def _tried(case: ImpactCase) -> _Tried | None:
-    """The case with its rows and W; None if the rows are too close to dependent to determine the impulses."""
-    every = _with_tangents(case)
-    if case.friction is None or every.contacts > case.coordinates:
-        return None
-    if np.linalg.svd(every.unit_rows, compute_uv=False)[-1] < CLEAR:
-        return None
-    return _Tried(case, every.contact_jacobian, every.rows, every.rows @ every.rows.T, case.friction)
+def _together(case: ImpactCase) -> _Tried | None:
+    """All contacts with e = 0; None if there are fewer than two or their rows are too close to dependent."""
+    several = case.tangents is not None and case.contacts > 1 and case.speed > 0.0
+    return _tried(replace(case, restitution=0.0)) if several else None
 
 
-def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
+@law(FRICTIONAL_LAWS, "sticking", "one contact, e = 0: it sticks where Coulomb's law leaves no other answer")
+def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """|v_t⁺| / (‖A_t‖ |u|) of one contact with e = 0, if p = −W⁻¹γ⁻ lies so far inside the cone that p is unique.
 
     Any other solution p' of Coulomb's law slides, so |p'_t| = μ p'_n. With (p' − p)ᵀW(p' − p) ≥ 0 this gives
@@ -234,19 +238,20 @@ def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: 
         return None
     slip = single.given[1:] @ outcome(resolver, single.case)
     scale = np.sqrt(np.trace(W[1:, 1:])) * case.speed
-    return LawResidual("sticking", float(np.linalg.norm(slip) / scale), bounds.restitution)
+    return float(np.linalg.norm(slip) / scale), bounds.restitution
 
 
-def friction_opposes_sliding(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
+@law(FRICTIONAL_LAWS, "friction_opposes", "one contact, e = 0: p_t·v_t⁺ ≤ 0")
+def friction_opposes_sliding(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """p_t·v_t⁺ / |u|² of one contact with e = 0; it is positive if friction pushes in the direction of sliding."""
     single = _single(case)
     if single is None:
         return None
-    power, _ = _friction_power(single, resolver)
-    return LawResidual("friction_opposes", max(0.0, float(power[0])), bounds.restitution)
+    return max(0.0, float(_friction_power(single, resolver)[0][0])), bounds.restitution
 
 
-def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual | None:
+@law(FRICTIONAL_LAWS, "maximal_dissipation", "e = 0: p_t·v_t⁺ = −μ p |v_t⁺| at every contact")
+def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """Largest |p_t·v_t⁺ + μ p_n |v_t⁺|| / |u|² of a contact with e = 0; 0 if friction at its limit opposes sliding.
 
     The law checks all contacts together if their rows determine every impulse, else the first contact alone. It skips
@@ -256,14 +261,7 @@ def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds
     if tried is None:
         return None
     power, limit = _friction_power(tried, resolver)
-    return LawResidual("maximal_dissipation", float(np.max(np.abs(power + limit))), bounds.restitution)
-
-
-def _together(case: ImpactCase) -> _Tried | None:
-    """All contacts with e = 0; None if there are fewer than two or their rows are too close to dependent."""
-    if case.tangents is None or case.friction is None or case.contacts < 2 or case.speed == 0.0:
-        return None
-    return _tried(replace(case, restitution=0.0))
+    return float(np.max(np.abs(power + limit))), bounds.restitution
 
 
 def _friction_power(tried: _Tried, resolver: Resolver) -> tuple[Floats, Floats]:
@@ -278,54 +276,24 @@ def _friction_power(tried: _Tried, resolver: Resolver) -> tuple[Floats, Floats]:
     return pushes * np.einsum("cm,cm->c", friction, slip), pushes * limit
 
 
-# Theorems 1 and 2 in exact arithmetic on the doubles: a resolver may promise no gain at all, not even in the last bit.
+FRICTIONAL_LAWS |= {name: LAWS[name] for name in ("momentum", "repeatability", "arguments")}
+
+
 def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """(KE⁺ − KE⁻)/KE⁻ in rationals, with tolerance 0; infinite if motion appears from rest."""
-    relative = relative_gain(case.mass_matrix, case.velocity, own_outcome(resolver, case))
+    """(KE⁺ − KE⁻)/KE⁻ in rationals on the doubles, with tolerance 0; infinite if motion appears from rest."""
+    relative = certificate.relative_gain(case.mass_matrix, case.velocity, own_outcome(resolver, case))
     return LawResidual("exact_energy", relative, 0.0, bounds.energy_gain(case))
 
 
+# A resolver may promise no gain at all, not even in the last bit.
 EXACT_LAWS = {"exact_energy": Law("KE⁺ ≤ KE⁻ in real arithmetic", no_gain_in_real_arithmetic)}
-
-# Laws that compare two calls: v⁺ of contacts that only push is unique, even if p is not.
-_UNIQUE = ("free_motion", "momentum", "duplicated_rows", "row_order", "units", "coordinates", "groups")
-
-UNILATERAL_LAWS: dict[str, Law] = {
-    "kinetic_energy": LAWS["kinetic_energy"],
-    "impulse_range": Law(LAWS["impulse_range"].statement, impulse_comes_from_the_contacts),
-    "pushing": Law("M(v⁺ − v⁻) = Jᵀp with p ≥ 0: no contact pulls", contacts_only_push),
-    "no_penetration": Law("γ⁺ ≥ min(0, −e γ⁻): no contact is left approaching", nothing_is_driven_in),
-    "restitution": Law("γ⁺ ≥ −e γ⁻ where every contact approaches", restitution_is_met_or_exceeded),
-    "complementarity": Law("p ⟂ γ⁺ + e γ⁻ where every contact approaches", pushing_contacts_meet_restitution),
-    "mixed_restitution": Law("v⁺ is Newton's or Poisson's where some contacts approach and others separate",
-                             mixed_impacts_follow_newton_or_poisson),
-    "separating": Law("where no contact approaches v is left as it is", separating_contacts_do_nothing),
-    "elastic": Law("e = 1 conserves KE where every contact approaches", elastic_approach_conserves),
-    **{name: LAWS[name] for name in (*_UNIQUE, "repeatability", "arguments")},
-}
-
-FRICTIONAL_LAWS: dict[str, Law] = {
-    "kinetic_energy": LAWS["kinetic_energy"],
-    "impulse_range": Law("M(v⁺ − v⁻) lies in range([Jᵀ Tᵀ])", impulse_comes_from_the_contacts),
-    "cone": Law("M(v⁺ − v⁻) = Jᵀp + Tᵀp_t with |p_t| ≤ μ p at every contact", contacts_only_push),
-    "no_penetration": UNILATERAL_LAWS["no_penetration"],
-    "restitution": UNILATERAL_LAWS["restitution"],
-    "separating": UNILATERAL_LAWS["separating"],
-    "sticking": Law("one contact, e = 0: it sticks where Coulomb's law leaves no other answer",
-                    contacts_stick_where_they_can),
-    "friction_opposes": Law("one contact, e = 0: p_t·v_t⁺ ≤ 0", friction_opposes_sliding),
-    "maximal_dissipation": Law("e = 0: p_t·v_t⁺ = −μ p |v_t⁺| at every contact", sliding_dissipates_most),
-    **{name: LAWS[name] for name in ("momentum", "repeatability", "arguments")},
-}
-
-
 OF_RESTITUTION = ("restitution", "complementarity", "mixed_restitution", "elastic")
 
 
 class Contract(NamedTuple):
     """Laws, tolerances and impacts for one kind of resolver.
 
-    laws, optional : the laws by name; those in `optional` are checked only on request.
+    laws : the laws by name; those in EXACT_LAWS are checked only on request.
     bounds, largest_condition : default tolerances, and default largest κ(M) drawn.
     draw : makes the impact of a number; first : makes the impacts that come before the drawn ones.
     table : name of the table of laws in `verification.laws`, for generated tests.
@@ -336,9 +304,8 @@ class Contract(NamedTuple):
     bounds: Bounds
     largest_condition: float
     draw: Callable[[np.random.Generator, int, float], ImpactCase]
-    first: Callable[[np.random.Generator], Iterator[ImpactCase]]
     table: str
-    optional: tuple[str, ...] = ("exact_energy",)
+    first: Callable[[np.random.Generator], Iterator[ImpactCase]] = lambda rng: iter(())
     unjudged: str = ""
 
 
@@ -348,14 +315,10 @@ _UNJUDGED_FRICTION = (
 )
 
 
-def _nothing(rng: np.random.Generator) -> Iterator[ImpactCase]:
-    return iter(())
-
-
 CONTRACTS: dict[str, Contract] = {
-    "equality": Contract(LAWS | EXACT_LAWS, KIT, 1e8, draw_wide_case, adverse_cases, "LAWS"),
-    "unilateral": Contract(UNILATERAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e4, draw_one_sided_case, _nothing,
+    "equality": Contract(LAWS | EXACT_LAWS, KIT, 1e8, draw_wide_case, "LAWS", adverse_cases),
+    "unilateral": Contract(UNILATERAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e4, draw_one_sided_case,
                            "UNILATERAL_LAWS"),
-    "frictional": Contract(FRICTIONAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e2, draw_frictional_case, _nothing,
+    "frictional": Contract(FRICTIONAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e2, draw_frictional_case,
                            "FRICTIONAL_LAWS", unjudged=_UNJUDGED_FRICTION),
 }

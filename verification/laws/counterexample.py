@@ -13,7 +13,7 @@ import numpy as np
 from verification.impacts import Floats, ImpactCase
 from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS
-from verification.laws.engine_laws import ENGINE_LAWS
+from verification.laws.engine import ENGINE_LAWS, budgets, with_budget
 from verification.laws.resolver import Resolver, ResolverFault, outcome, own_outcome
 from verification.laws.strategies import SEARCHED, tangents_are_independent
 
@@ -32,13 +32,8 @@ def search_counterexample(
     from hypothesis import HealthCheck, Phase, find, settings
     from hypothesis.errors import NoSuchExample
 
-    profile = settings(
-        max_examples=examples,
-        database=None,
-        deadline=None,
-        phases=(Phase.generate, Phase.shrink),
-        suppress_health_check=list(HealthCheck),
-    )
+    profile = settings(max_examples=examples, database=None, deadline=None, phases=(Phase.generate, Phase.shrink),
+                       suppress_health_check=list(HealthCheck))
     try:
         return find(SEARCHED[kind](), fails, settings=profile, random=random.Random(seed))
     except NoSuchExample:
@@ -72,23 +67,16 @@ def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
         yield replace(case, **fewer)
     if case.coordinates > 1 and case.translations is None:
         for k in range(case.coordinates):
-            yield _without_coordinate(case, k)
+            mass, tangents = np.delete(case.mass_matrix, k, axis=0), case.tangents
+            yield replace(case, mass_matrix=np.delete(mass, k, axis=1), velocity=np.delete(case.velocity, k),
+                          contact_jacobian=np.delete(case.contact_jacobian, k, axis=1),
+                          tangents=None if tangents is None else np.delete(tangents, k, axis=2))
     for e in (1.0, 0.0):
         if case.unequal is None and case.restitution not in (1.0, e):
             yield replace(case, restitution=e)
     for digits in _DIGITS:
         for name in ("velocity", "contact_jacobian", "tangents", "mass_matrix", "friction", "unequal"):
             yield from _rounded(case, name, digits)
-
-
-def _without_coordinate(case: ImpactCase, k: int) -> ImpactCase:
-    return replace(
-        case,
-        mass_matrix=np.delete(np.delete(case.mass_matrix, k, axis=0), k, axis=1),
-        contact_jacobian=np.delete(case.contact_jacobian, k, axis=1),
-        tangents=None if case.tangents is None else np.delete(case.tangents, k, axis=2),
-        velocity=np.delete(case.velocity, k),
-    )
 
 
 def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
@@ -129,55 +117,41 @@ def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = No
 
     The laws in ENGINE_LAWS (a budget, extreme inputs) always test the engine; `resolver` and `bounds` are then unused.
     """
-    if law in ENGINE_LAWS:
-        return _test_of_the_engine(case, law)
-    table = "EXACT_LAWS" if law in EXACT_LAWS else CONTRACTS[contract].table
-    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else table
-    name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
-    imports = ["import numpy as np", f"from verification.laws import {table}, ImpactCase"]
-    imports.append(f"from verification.laws.bounds import {name or 'Bounds'}")
-    return "\n".join([
-        *imports,
-        import_line(resolver) or "\n# resolver = ...  the one under test",
-        *_test_of(case, law),
-        f"    residual = {table}[{law!r}].check(case, resolver, {name or _bounds(bounds)})",
-        "    assert residual.passed, residual",
-    ])  # fmt: skip
-
-
-def _test_of_the_engine(case: ImpactCase, law: str) -> str:
-    return "\n".join([
-        "import numpy as np",
-        "from verification.laws import ImpactCase",
-        "from verification.laws.engine_laws import ENGINE_LAWS",
-        *_test_of(case, law),
-        f"    law = ENGINE_LAWS[{law!r}]",
-        "    residual = law.check(case, law.ours)",
-        "    assert residual.passed, residual",
-    ])  # fmt: skip
-
-
-def _test_of(case: ImpactCase, law: str) -> list[str]:
-    """Lines of the test function's head and of its case."""
-    optional = {name: getattr(case, name) for name in ("translations", "tangents", "friction", "unequal")}
     arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
-    arrays |= {name: array for name, array in optional.items() if array is not None}
-    more = "".join(f", {name}={name}" for name, array in optional.items() if array is not None)
-    return [
-        "",
-        "",
-        f"def test_{law}():",
-        *(f"    {key} = {_written(array)}" for key, array in arrays.items()),
+    optional = {name: getattr(case, name) for name in ("translations", "tangents", "friction", "unequal")}
+    optional = {name: array for name, array in optional.items() if array is not None}
+    more = "".join(f", {name}={name}" for name in optional)
+    lines = [
+        "", "", f"def test_{law}():", *(f"    {key} = {_written(array)}" for key, array in (arrays | optional).items()),
         f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
     ]
+    if law in ENGINE_LAWS:
+        head = ["from verification.laws import ImpactCase", "from verification.laws.engine import ENGINE_LAWS"]
+        lines += [f"    law = ENGINE_LAWS[{law!r}]", "    residual = law.check(case, law.ours)"]
+    else:
+        table = "EXACT_LAWS" if law in EXACT_LAWS else CONTRACTS[contract].table
+        table = "UNEQUAL_LAWS" if law.startswith("unequal_") else table
+        name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
+        head = [f"from verification.laws import {table}, ImpactCase",
+                f"from verification.laws.bounds import {name or 'Bounds'}",
+                import_line(resolver) or "\n# resolver = ...  the one under test"]
+        tolerances = name or repr(bounds).replace("=inf", "=np.inf")
+        lines += [f"    residual = {table}[{law!r}].check(case, resolver, {tolerances})"]
+    return "\n".join(["import numpy as np", *head, *lines, "    assert residual.passed, residual"])
 
 
 def import_line(resolver: Any) -> str:
     """Return the lines that import `resolver`; empty for a lambda or another function that cannot be imported."""
-    if isinstance(resolver, partial) and not resolver.args:
-        line = _import_of(resolver.func, resolver.func.__name__) if _can_be_imported(resolver.func) else ""
-        return line and f"{line}\nfrom functools import partial\n\nresolver = {name_of(resolver, 'partial')}"
-    return _import_of(resolver, f"{resolver.__name__} as resolver") if _can_be_imported(resolver) else ""
+    inner = resolver.func if isinstance(resolver, partial) and not resolver.args else resolver
+    module, name = getattr(inner, "__module__", None), getattr(inner, "__qualname__", "")
+    if not isinstance(module, str) or module == "__main__":
+        return ""
+    if getattr(sys.modules.get(module), name, None) is not inner:
+        return ""
+    if inner is resolver:
+        return f"from {module} import {name} as resolver"
+    options = name_of(resolver, "partial")
+    return f"from {module} import {name}\nfrom functools import partial\n\nresolver = {options}"
 
 
 def name_of(resolver: Any, word: str = "") -> str:
@@ -187,21 +161,6 @@ def name_of(resolver: Any, word: str = "") -> str:
         name = getattr(resolver.func, "__name__", repr(resolver.func))
         return f"{word}({name}, {options})" if word else f"{name}({options})"
     return getattr(resolver, "__qualname__", None) or repr(resolver)
-
-
-def _can_be_imported(resolver: Any) -> bool:
-    module, name = getattr(resolver, "__module__", None), getattr(resolver, "__qualname__", "")
-    if not isinstance(module, str) or module == "__main__":
-        return False
-    return getattr(sys.modules.get(module), name, None) is resolver
-
-
-def _import_of(resolver: Any, name: str) -> str:
-    return f"from {resolver.__module__} import {name}"
-
-
-def _bounds(bounds: Bounds) -> str:
-    return repr(bounds).replace("=inf", "=np.inf")
 
 
 def _written(array: np.ndarray) -> str:
@@ -232,24 +191,15 @@ def strike(part: str, case: Any, resolver: Resolver) -> Struck | None:
     """
     if not isinstance(case, ImpactCase):
         return None
-    if part not in ENGINE_LAWS:
-        return _struck(case, (case.contacts,), (partial(own_outcome, resolver),))
-    ours = ENGINE_LAWS[part].ours
-    if part != "truncation":
-        return _struck(case, (case.contacts,), (partial(outcome, ours),))
-    budgets = tuple(range(min(case.contacts, case.coordinates) + 1))
-    return _struck(case, budgets, tuple(partial(outcome, partial(_in_budget, ours, rows)) for rows in budgets))
-
-
-def _in_budget(subject: Callable[..., Any], rows: int, *impact: Any) -> Any:
-    return subject(*impact, rows)
-
-
-def _struck(case: ImpactCase, rows: tuple[int, ...], calls: tuple[Callable[[ImpactCase], Floats], ...]) -> Struck:
-    after, complaints = np.full((len(rows), case.coordinates), np.nan), []
-    for velocity, call in zip(after, calls, strict=True):
+    calls = {case.contacts: partial(own_outcome, resolver)}
+    if part == "truncation":
+        calls = {rows: partial(outcome, with_budget(ENGINE_LAWS[part].ours, rows)) for rows in budgets(case)}
+    elif part in ENGINE_LAWS:
+        calls = {case.contacts: partial(outcome, ENGINE_LAWS[part].ours)}
+    after, complaints = np.full((len(calls), case.coordinates), np.nan), []
+    for velocity, call in zip(after, calls.values(), strict=True):
         try:
             velocity[:] = call(case)
         except ResolverFault as fault:
             complaints.append(str(fault))
-    return Struck(case, rows, after, "; ".join(complaints))
+    return Struck(case, tuple(calls), after, "; ".join(complaints))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from inspect import signature
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,15 +23,19 @@ from verification.impacts import (
     ImpactCase,
     with_unequal_restitution,
 )
-from verification.laws.bounds import KIT, Bounds, LawResidual
-from verification.laws.contracts import CONTRACTS, Contract
+from verification.laws.bounds import KIT, Bounds, Law, LawCount, LawResidual
+from verification.laws.contracts import CONTRACTS, EXACT_LAWS, Contract
 from verification.laws.counterexample import as_test, name_of, search_counterexample, shrink
-from verification.laws.impact_laws import OF_ONE_CALL, UNEQUAL_LAWS, Law
-from verification.laws.resolver import Answer, Resolver, ResolverFault, Watched, own_outcome
+from verification.laws.equality import OF_ONE_CALL, UNEQUAL_LAWS
+from verification.laws.resolver import Resolver, ResolverFault, Watched, own_outcome
+
+NOTABLE = 1e-6  # the search prefers counterexamples with a residual above this, which rounding cannot explain
+IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
+PATIENCE = 600.0  # [s] ten times as long
 
 
-@dataclass(frozen=True)
-class LawVerdict:
+@dataclass
+class LawVerdict(LawCount):
     """Verdict on one law over all impacts.
 
     Attributes
@@ -47,18 +51,16 @@ class LawVerdict:
     error : exception that the law itself raised, after which it was not tried again; else None.
     """
 
-    law: str
-    statement: str
-    checked: int
-    failures: int
-    worst: LawResidual | None
-    worst_case: ImpactCase | None
-    largest: float
+    statement: str = ""
+    worst_case: ImpactCase | None = None
+    largest: float = -np.inf
     largest_case: ImpactCase | None = None
     fault: str = ""
     error: Exception | None = None
     severe: int = 0
     smallest_case: ImpactCase | None = None
+    _largest_failure: float = field(default=-np.inf, repr=False)
+    _smallest: tuple[bool, int] = field(default=(True, 0), repr=False)  # whether it is below NOTABLE, and its size
 
     @property
     def passed(self) -> bool:
@@ -72,6 +74,30 @@ class LawVerdict:
         grades = f" ({self.severe} by more than rounding, {within} within it)" if within else ""
         line = f"  {mark} {self.statement}: {self.failures} of {self.checked} impacts break it{grades}, {worst}"
         return f"{line}\n         {self.fault}" if self.fault else line
+
+    def try_on(self, law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
+        """Try the law on one impact; a law that raises an exception is not tried again."""
+        if self.error is not None:
+            return
+        try:
+            residual, complaint = residual_of(law, case, resolver, bounds)
+        except Exception as error:
+            self.error, self.fault = error, f"the law itself raised {type(error).__name__}: {error}"
+            return
+        if residual is None:
+            return
+        before = self.worst
+        passed = self.add(residual)
+        if self.worst is not before:
+            self.worst_case = case
+        self.severe += residual.severe
+        self.fault = self.fault or complaint
+        self.largest = max(self.largest, residual.value)
+        if not passed and (self.largest_case is None or residual.value > self._largest_failure):
+            self._largest_failure, self.largest_case = residual.value, case
+        size = residual.value < NOTABLE, _size(case)
+        if not passed and (self.smallest_case is None or size < self._smallest):
+            self._smallest, self.smallest_case = size, case
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,55 +203,6 @@ def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
         yield lead + text.replace("\n", "\n" + " " * len(lead))
 
 
-@dataclass
-class Tally:
-    """Running counts and worst cases of one law."""
-
-    name: str
-    law: Law
-    checked: int = 0
-    failures: int = 0
-    severe: int = 0
-    fault: str = ""
-    error: Exception | None = None
-    largest: float = -np.inf
-    worst: LawResidual | None = None
-    worst_case: ImpactCase | None = field(default=None, repr=False)
-    largest_failure: float = -np.inf
-    largest_case: ImpactCase | None = field(default=None, repr=False)
-    smallest: tuple[bool, int] = (True, 0)  # smallest case: whether its residual is below NOTABLE, and its size
-    smallest_case: ImpactCase | None = field(default=None, repr=False)
-
-    def add(self, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
-        """Try the law on one impact; a law that raises an exception is not tried again."""
-        if self.error is not None:
-            return
-        try:
-            residual, complaint = residual_of(self.law, case, resolver, bounds)
-        except Exception as error:
-            self.error, self.fault = error, f"the law itself raised {type(error).__name__}: {error}"
-            return
-        if residual is None:
-            return
-        self.checked += 1
-        self.failures += not residual.passed
-        self.severe += residual.severe
-        self.fault = self.fault or complaint
-        self.largest = max(self.largest, residual.value)
-        if self.worst is None or (residual.ratio, residual.value) > (self.worst.ratio, self.worst.value):
-            self.worst, self.worst_case = residual, case
-        if not residual.passed and (self.largest_case is None or residual.value > self.largest_failure):
-            self.largest_failure, self.largest_case = residual.value, case
-        size = residual.value < NOTABLE, _size(case)
-        if not residual.passed and (self.smallest_case is None or size < self.smallest):
-            self.smallest, self.smallest_case = size, case
-
-    def verdict(self) -> LawVerdict:
-        """Return the verdict so far."""
-        return LawVerdict(self.name, self.law.statement, self.checked, self.failures, self.worst, self.worst_case,
-                          self.largest, self.largest_case, self.fault, self.error, self.severe, self.smallest_case)
-
-
 def _size(case: ImpactCase) -> int:
     return case.coordinates + case.contacts
 
@@ -236,59 +213,6 @@ def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) 
         return law.check(case, resolver, bounds), ""
     except ResolverFault as fault:
         return LawResidual("", np.inf, 0.0), str(fault)
-
-
-@dataclass(frozen=True)
-class LawCount:
-    """Counts of one law over some cases; `worst` is the residual with the largest value / tolerance."""
-
-    law: str
-    checked: int
-    failures: int
-    worst: LawResidual | None
-
-
-@dataclass
-class RunningCount:
-    """Running counts of one law, updated case by case."""
-
-    checked: int = 0
-    failures: int = 0
-    worst: LawResidual | None = None
-    worst_ratio: float = -np.inf
-
-    def add(self, residual: LawResidual) -> bool:
-        """Count one case; return whether the law holds in it."""
-        ratio = residual.ratio
-        self.checked += 1
-        self.failures += not ratio <= 1.0
-        if self.worst is None or ratio > self.worst_ratio:
-            self.worst, self.worst_ratio = residual, ratio
-        return ratio <= 1.0
-
-    def count(self, law: str) -> LawCount:
-        """Return the counts so far."""
-        return LawCount(law, self.checked, self.failures, self.worst)
-
-
-def added(one: LawCount, other: LawCount) -> LawCount:
-    """Add the counts of two sets of cases of one law."""
-    residuals = [count.worst for count in (one, other) if count.worst is not None]
-    worst = max(residuals, key=lambda residual: residual.ratio, default=None)
-    return LawCount(one.law, one.checked + other.checked, one.failures + other.failures, worst)
-
-
-def residual_count(residuals: Iterable[LawResidual]) -> LawCount:
-    """Return the counts of one law from the residuals of many cases."""
-    total = RunningCount()
-    for residual in residuals:
-        total.add(residual)
-    return total.count("")
-
-
-NOTABLE = 1e-6  # the search prefers counterexamples with a residual above this, which rounding cannot explain
-IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
-PATIENCE = 600.0  # [s] ten times as long
 
 
 def check_passivity(
@@ -364,10 +288,10 @@ def check_passivity(
     _refuse_signature(resolver, contract)
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
-    tallies = {name: Tally(name, law) for name, law in chosen.items()}
+    tried = _Tried(chosen, {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()}, bounds)
     with one_thread():
-        done = _try_all(tallies, resolver, bounds, _Draw(int(impacts), seed, condition, terms), ends, progress)
-        verdicts = tuple(tally.verdict() for tally in tallies.values())
+        done = _try_all(tried, resolver, _Draw(int(impacts), seed, condition, terms), ends, progress)
+        verdicts = tuple(tried.verdicts.values())
         broken = next((verdict for verdict in verdicts if not verdict.passed), None)
         example = None if broken is None else _counterexample(
             chosen[broken.law], broken, resolver, bounds, search, seed, ends, contract)
@@ -411,7 +335,7 @@ def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: 
     terms = _contract(contract, unequal_restitution)
     known = terms.laws | (UNEQUAL_LAWS if unequal_restitution else {})
     if laws is None:
-        return {name: law for name, law in known.items() if name not in terms.optional}
+        return {name: law for name, law in known.items() if name not in EXACT_LAWS}
     if not isinstance(laws, Iterable):
         raise ArgumentError("laws", laws, "names of laws")
     names = [laws] if isinstance(laws, str) else list(laws)
@@ -430,27 +354,34 @@ def _returned(resolver: Resolver, case: ImpactCase) -> Floats | str:
         return str(fault)
 
 
-@dataclass(frozen=True)
-class _Draw:
+class _Draw(NamedTuple):
     impacts: int
     seed: int
     largest_condition: float
     contract: Contract
 
 
-def _try_all(tallies: dict[str, Tally], resolver: Resolver, bounds: Bounds, draw: _Draw, ends: float,
+class _Tried(NamedTuple):
+    """The laws that are tried, and their verdicts so far."""
+
+    laws: dict[str, Law]
+    verdicts: dict[str, LawVerdict]
+    bounds: Bounds
+
+
+def _try_all(tried: _Tried, resolver: Resolver, draw: _Draw, ends: float,
              progress: Callable[[int, int], None] | None) -> int:
     """Check every impact against its laws; return the number of random impacts tried within the time limit."""
     watched = Watched(resolver)
-    for done, case, mixed in _drawn(draw, any(name in UNEQUAL_LAWS for name in tallies)):
-        for name in _laws_for(case, done, tuple(tallies)):
+    for done, case, mixed in _drawn(draw, any(name in UNEQUAL_LAWS for name in tried.laws)):
+        for name in _laws_for(case, done, tuple(tried.laws)):
             if time.monotonic() > ends:
                 return max(0, done - 1)
-            tallies[name].add(mixed if name in UNEQUAL_LAWS else case, watched, bounds)
+            own = mixed if name in UNEQUAL_LAWS else case
+            tried.verdicts[name].try_on(tried.laws[name], own, watched, tried.bounds)
         for suspect, v_plus in watched.suspects:
             if suspect is not case and suspect is not mixed:  # judged by their own laws
-                within = suspect.condition <= draw.largest_condition
-                _judge_energy(tallies, suspect, v_plus, resolver, bounds if within else replace(bounds, ceiling=np.inf))
+                _judge_energy(tried, suspect, v_plus, resolver, draw.largest_condition)
         watched.suspects.clear()
         if progress is not None and done > 0:
             progress(done, draw.impacts)
@@ -465,15 +396,14 @@ def _laws_for(case: ImpactCase, number: int, laws: tuple[str, ...]) -> Iterator[
             yield name
 
 
-def _judge_energy(
-    tallies: dict[str, Tally], case: ImpactCase, v_plus: Any, resolver: Resolver, bounds: Bounds
-) -> None:
+def _judge_energy(tried: _Tried, case: ImpactCase, v_plus: Any, resolver: Resolver, largest_condition: float) -> None:
     """Check the energy of an answer that another law got for a variant of an impact, without another call."""
     own = replace(case, family=f"{case.family}, a variant of it that another law tried")
-    own._answers[id(resolver)] = resolver, Answer(v_plus, 0)
+    own._answers[id(resolver)] = resolver, (v_plus, 0)
     name = "kinetic_energy" if case.unequal is None else "unequal_kinetic_energy"
-    if name in tallies:
-        tallies[name].add(own, resolver, bounds)
+    bounds = tried.bounds if case.condition <= largest_condition else replace(tried.bounds, ceiling=np.inf)
+    if name in tried.laws:
+        tried.verdicts[name].try_on(tried.laws[name], own, resolver, bounds)
 
 
 def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
@@ -481,8 +411,7 @@ def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[int, ImpactCase, Impact
     ones count from 1. Without `unequal` the variant is the impact itself.
     """
     rng, other, adverse = (np.random.default_rng(seed) for seed in (draw.seed, [draw.seed, 1], [draw.seed, 2]))
-    first = draw.contract.first(adverse)
-    for case in first:
+    for case in draw.contract.first(adverse):
         yield 0, case, with_unequal_restitution(adverse, case) if unequal else case
     for number in range(draw.impacts):
         case = draw.contract.draw(rng, number, draw.largest_condition)

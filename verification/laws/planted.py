@@ -1,15 +1,19 @@
-"""Resolvers with one planted bug each, made from the correct resolver, and the law that must detect each bug."""
+"""One planted fault for each law: a faulty resolver, a faulty subject of `engine`, or a faulty run. Each law must
+detect its fault; other laws may detect it, too.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference.exact import exact_impact
+from iapb.run import Run
+from iapb.system import System
 from verification.impacts import Floats
+from verification.laws.engine import Wall, saturated
 from verification.laws.resolver import (
     RANK_CUT,
     Resolver,
@@ -19,33 +23,25 @@ from verification.laws.resolver import (
     sound_resolver,
     whitened,
 )
-from verification.methods import gram_pinv
+from verification.laws.scenes import SceneCase
+from verification.stability.device_port import DeviceLoop, actuator_forces
 
-TOO_MUCH = Fraction(10001, 10000)  # factor on the impulse that e requires
+
+class Fault(NamedTuple):
+    """A fault: its name, and how to make its resolver or subject."""
+
+    name: str
+    make: Callable[[], Callable[..., Any]]
 
 
+def plain(name: str, subject: Callable[..., Any]) -> Fault:
+    """Return the fault of a subject without memory."""
+    return Fault(name, lambda: subject)
+
+
+# Faulty resolvers, made from the parts of the correct one.
 def wrong_sign(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return projecting(M, J, v, -(1.0 + e))
-
-
-def squared_restitution(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return projecting(M, J, v, 1.0 + e * e)
-
-
-def lost_one_plus(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return projecting(M, J, v, e)
-
-
-def missing_half(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return projecting(M, J, v, 0.5 * (1.0 + e))
-
-
-def too_loose_rank(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return projecting(M, J, v, 1.0 + e, cut=1e-2)
-
-
-def too_tight_rank(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return projecting(M, J, v, 1.0 + e, cut=1e-18)
 
 
 def transposed_factor(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -55,18 +51,9 @@ def transposed_factor(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return np.linalg.solve(parts.lower, u - (1.0 + e) * (Q.T @ (Q @ u)))
 
 
-def forgotten_mass(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return projecting(np.eye(len(v)), J, v, 1.0 + e)
-
-
-def diagonal_mass(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Ignores the coupling between coordinates in M."""
-    return projecting(np.diag(np.diag(M)), J, v, 1.0 + e)
-
-
-def reversed_velocity(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Returns −e v: this keeps energy and restitution but ignores the contacts."""
-    return -e * v
+def per_body_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """(13)-(14): reverses the two bodies of a self-collision separately (here: positive and negative entries)."""
+    return sound_resolver(M, np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)]), v, e)
 
 
 def one_after_the_other(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -84,65 +71,6 @@ def double_counted(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return back(parts, parts.u - (1.0 + e) * (parts.rows.T @ (parts.rows @ parts.u)))
 
 
-def approaching_only(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Drops the rows with a separating velocity, although the caller included them."""
-    return sound_resolver(M, J[J @ v < 0.0], v, e)
-
-
-def pulling_clipped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Sets each pulling impulse to zero separately."""
-    parts = whitened(M, J, v)
-    p = -(1.0 + e) * (np.linalg.pinv(parts.rows.T, rcond=RANK_CUT) @ parts.u)
-    return back(parts, parts.u + parts.rows.T @ np.maximum(p, 0.0))
-
-
-def per_body_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """(13)-(14): reverses the two bodies of a self-collision separately (here: positive and negative entries)."""
-    split = np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)])
-    return sound_resolver(M, split, v, e)
-
-
-def single_precision(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return sound_resolver(M, J, v, e).astype(np.float32).astype(np.float64)
-
-
-def damped_formula(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Uses (W + λI)⁻¹ with a λ far above rounding."""
-    X = np.linalg.solve(M, J.T)
-    W = J @ X
-    return v - (1.0 + e) * (X @ np.linalg.solve(W + 1e-3 * np.eye(len(W)), J @ v))
-
-
-def unscaled_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Decides the rank without scaling the rows, so short rows are lost."""
-    lower = np.linalg.cholesky(M)
-    rows = np.linalg.solve(lower, J.T).T
-    _, values, right = np.linalg.svd(rows, full_matrices=False)
-    Q = right[values > 1e-6 * np.max(values, initial=0.0)]
-    u = lower.T @ v
-    return np.linalg.solve(lower.T, u - (1.0 + e) * (Q.T @ (Q @ u)))
-
-
-def fails_without_contacts(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J))
-
-
-def absolute_restitution(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return projecting(M, J, v, 1.0 + abs(e))
-
-
-def nearly_elastic(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Gives 1e-4 less of the impulse than e requires."""
-    return projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))
-
-
-def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Gives 1e-4 more of the impulse than e requires; rationals, rounded once, give the same bits under every BLAS."""
-    before = [Fraction(x) for x in v.tolist()]
-    exact = exact_impact(M, J, v, e).velocity
-    return np.array([float(a + TOO_MUCH * (b - a)) for a, b in zip(before, exact, strict=True)])
-
-
 def one_gradient_step(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Stops an iteration after its first step, which depends on how often a row is repeated."""
     parts = whitened(M, J, v)
@@ -150,9 +78,12 @@ def one_gradient_step(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return back(parts, parts.u - (1.0 + e) / largest * (parts.rows.T @ (parts.rows @ parts.u)))
 
 
-def short_rows_dropped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Drops rows below a fixed length, which depends on the units."""
-    return sound_resolver(M, J[np.linalg.norm(J, axis=1) > 0.2], v, e)
+def unscaled_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Decides the rank without scaling the rows, so short rows are lost."""
+    lower = np.linalg.cholesky(M)
+    _, values, right = np.linalg.svd(np.linalg.solve(lower, J.T).T, full_matrices=False)
+    Q, u = right[values > 1e-6 * np.max(values, initial=0.0)], lower.T @ v
+    return np.linalg.solve(lower.T, u - (1.0 + e) * (Q.T @ (Q @ u)))
 
 
 def three_rows_at_most(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -174,32 +105,9 @@ def makes_warm_start() -> Resolver:
     return warm_start
 
 
-def nan_without_contacts(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return sound_resolver(M, J, v, e) if len(J) else np.full_like(v, np.nan)
-
-
-def column_of_velocities(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Returns v⁺ with shape (d, 1)."""
-    return sound_resolver(M, J, v, e)[:, None]
-
-
 def writes_on_its_arguments(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     v[:] = sound_resolver(M, J, v, e)
     return v
-
-
-def gives_up(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    raise RuntimeError("did not converge")
-
-
-def makes_stale_jacobian() -> Resolver:
-    """Returns a resolver that reuses the Jacobian of the first call with each shape."""
-    remembered: dict[tuple[int, ...], Floats] = {}
-
-    def stale_jacobian(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-        return sound_resolver(M, remembered.setdefault(J.shape, J), v, e)
-
-    return stale_jacobian
 
 
 def each_contact_its_own_restitution(M: Floats, J: Floats, v: Floats, e: Floats) -> Floats:
@@ -211,49 +119,178 @@ def each_contact_its_own_restitution(M: Floats, J: Floats, v: Floats, e: Floats)
     return back(parts, parts.u - np.linalg.pinv(parts.rows, rcond=RANK_CUT) @ wanted)
 
 
-class PlantedBug(NamedTuple):
-    """A bug: a function that makes the resolver, and a law that must detect it (other laws may detect it, too)."""
-
-    make: Callable[[], Resolver]
-    caught_by: str
-
-
-def plain(resolver: Resolver, caught_by: str) -> PlantedBug:
-    """Return the planted bug of a resolver without memory."""
-    return PlantedBug(lambda: resolver, caught_by)
-
-
-PLANTED_BUGS: dict[str, PlantedBug] = {
-    "wrong_sign": plain(wrong_sign, "kinetic_energy"),
-    "squared_restitution": plain(squared_restitution, "restitution"),
-    "lost_one_plus": plain(lost_one_plus, "restitution"),
-    "missing_half": plain(missing_half, "restitution"),
-    "too_loose_rank": plain(too_loose_rank, "restitution"),
-    "too_tight_rank": plain(too_tight_rank, "free_motion"),
-    "transposed_factor": plain(transposed_factor, "impulse_range"),
-    "forgotten_mass": plain(forgotten_mass, "kinetic_energy"),
-    "diagonal_mass": plain(diagonal_mass, "coordinates"),
-    "reversed_velocity": plain(reversed_velocity, "impulse_range"),
-    "one_after_the_other": plain(one_after_the_other, "row_order"),
-    "double_counted": plain(double_counted, "duplicated_rows"),
-    "approaching_only": plain(approaching_only, "restitution"),
-    "pulling_clipped": plain(pulling_clipped, "restitution"),
-    "printed_formula": plain(gram_pinv, "kinetic_energy"),
-    "per_body_rows": plain(per_body_rows, "momentum"),
-    "single_precision": plain(single_precision, "restitution"),
-    "damped_formula": plain(damped_formula, "restitution"),
-    "unscaled_rows": plain(unscaled_rows, "row_scaling"),
-    "fails_without_contacts": plain(fails_without_contacts, "kinetic_energy"),
-    "absolute_restitution": plain(absolute_restitution, "no_impulse"),
-    "nearly_elastic": plain(nearly_elastic, "elastic"),
-    "one_gradient_step": plain(one_gradient_step, "redundancy"),
-    "short_rows_dropped": plain(short_rows_dropped, "units"),
-    "three_rows_at_most": plain(three_rows_at_most, "groups"),
-    "warm_start": PlantedBug(makes_warm_start, "repeatability"),
-    "nan_without_contacts": plain(nan_without_contacts, "kinetic_energy"),
-    "column_of_velocities": plain(column_of_velocities, "kinetic_energy"),
-    "writes_on_its_arguments": plain(writes_on_its_arguments, "arguments"),
-    "gives_up": plain(gives_up, "kinetic_energy"),
-    "stale_jacobian": PlantedBug(makes_stale_jacobian, "restitution"),
-    "returns_too_much": plain(returns_too_much, "kinetic_energy"),
+PLANTED_BUGS: dict[str, Fault] = {
+    "kinetic_energy": plain("wrong_sign", wrong_sign),
+    "restitution": plain("squared_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + e * e)),
+    "free_motion": plain("too_tight_rank", lambda M, J, v, e: projecting(M, J, v, 1.0 + e, cut=1e-18)),
+    "impulse_range": plain("transposed_factor", transposed_factor),
+    # ignores the coupling between coordinates in M
+    "coordinates": plain("diagonal_mass", lambda M, J, v, e: projecting(np.diag(np.diag(M)), J, v, 1.0 + e)),
+    "row_order": plain("one_after_the_other", one_after_the_other),
+    "duplicated_rows": plain("double_counted", double_counted),
+    "momentum": plain("per_body_rows", per_body_rows),
+    "row_scaling": plain("unscaled_rows", unscaled_rows),
+    "no_impulse": plain("absolute_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + abs(e))),
+    # 1e-4 less of the impulse than e requires
+    "elastic": plain("nearly_elastic", lambda M, J, v, e: projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))),
+    "redundancy": plain("one_gradient_step", one_gradient_step),
+    # a fixed length depends on the units
+    "units": plain("short_rows_dropped",
+                   lambda M, J, v, e: sound_resolver(M, J[np.linalg.norm(J, axis=1) > 0.2], v, e)),
+    "groups": plain("three_rows_at_most", three_rows_at_most),
+    "repeatability": Fault("warm_start", makes_warm_start),
+    "arguments": plain("writes_on_its_arguments", writes_on_its_arguments),
 }
+
+
+# Faulty subjects of the laws of `engine`.
+def not_orthogonal(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Floats:
+    """Uses the first rows, each with the impulse that it would need alone; exact for one row only."""
+    return double_counted(M, J[:budget], v, e)
+
+
+def makes_late_wall() -> Wall:
+    """Returns a wall whose spring uses the previous reading of the depth."""
+    before = [0.0]
+
+    def late_wall(depth: float, rate: float, K: float, B: float) -> float:
+        late, before[0] = before[0], depth
+        return max(0.0, K * late + B * rate) if depth > 0.0 else 0.0
+
+    return late_wall
+
+
+def one_factor_for_all(case: SceneCase) -> Run:
+    """Multiplies the velocities of all bodies by 0.999 for each impact, at the end of its step."""
+    run = case.simulate()
+    factor = np.ones(len(run.time))
+    np.multiply.at(factor, run.impacts.step + 1, 0.999)
+    return replace(run, v=run.v * factor[:, None])
+
+
+def stiffer_coupler(loop: DeviceLoop, positions: Floats) -> Floats:
+    """Uses a coupler whose stiffness is 5 % above the stated one."""
+    return actuator_forces(replace(loop, stiffness=1.05 * loop.stiffness), positions)
+
+
+PLANTED_ENGINE_FAULTS: dict[str, Fault] = {
+    "truncation": plain("rows not made orthogonal", not_orthogonal),
+    "device_limits": plain("saturation, component by component", saturated),
+    "group_splitting": plain("one factor for all groups", one_factor_for_all),
+    "hand_port": Fault("a wall one reading late", makes_late_wall),
+    "device_port": plain("a coupler stiffer than it says", stiffer_coupler),
+    "extremes": plain("plain numpy without checks", sound_resolver),
+}
+
+
+# Runs that were simulated or recorded wrongly: a fault takes a scene and returns such a run, or None if it has no
+# effect in the scene.
+def not_a_number(case: SceneCase) -> Run:
+    """Sets one velocity of the last state to NaN."""
+    run = case.simulate()
+    v = run.v.copy()
+    v[-1, 0] = np.nan
+    return replace(run, v=v)
+
+
+def energised_impact(case: SceneCase) -> Run | None:
+    """Makes the last impact return 1 + 1e-6 times the velocity before it."""
+    run = case.simulate()
+    if not len(run.impacts.step):
+        return None
+    v_plus = run.impacts.v_plus.copy()
+    v_plus[-1] = -(1.0 + 1e-6) * run.impacts.v_minus[-1]
+    return replace(run, impacts=replace(run.impacts, v_plus=v_plus))
+
+
+def doubled_impulse(case: SceneCase) -> Run | None:
+    """Records the impulses of the impacts with twice their value."""
+    run = case.simulate()
+    doubled = replace(run.impacts, impulse=2.0 * run.impacts.impulse)
+    return replace(run, impacts=doubled) if np.any(run.impulse) else None
+
+
+def lost_gravity(case: SceneCase) -> Run | None:
+    """Simulates a scene with gravity as if it had none."""
+    if not case.values.get("gravity"):
+        return None
+    weightless = replace(case, values={key: value for key, value in case.values.items() if key != "gravity"})
+    return replace(weightless.simulate(), scene_source=case.scene().source_text)
+
+
+def moved_by_the_old_velocity(case: SceneCase) -> Run:
+    """Combines positions of explicit Euler with velocities of semi-implicit Euler."""
+    run, mechanism = case.simulate(), System(case.scene()).mechanism
+    q = [run.q[0]]
+    for v in run.v[:-1]:
+        q.append(mechanism.integrate(q[-1], v, run.dt))
+    return replace(run, q=np.array(q))
+
+
+def missing_half(case: SceneCase) -> Run | None:
+    """Erratum 1: records the impact losses without their factor ½."""
+    run = case.simulate()
+    if run.energy["impact_loss"][-1] < 1e-3 * np.max(run.energy["kinetic"]):
+        return None
+    return replace(run, energy=dict(run.energy) | {"impact_loss": 2.0 * run.energy["impact_loss"]})
+
+
+def _simulated_as(case: SceneCase, **contact: Any) -> Run:
+    """Return the run with other contact constants, recorded as one of the scene."""
+    values = case.values | {"contact": case.values["contact"] | contact}
+    return replace(replace(case, values=values).simulate(), scene_resolved=case.scene().resolved())
+
+
+def unclamped_penalty(case: SceneCase) -> Run | None:
+    """Lets contacts pull, as in the printed equation, although the scene forbids it."""
+    if case.values["contact"].get("penalty") == "printed" or not case.values["contact"]["damping"]:
+        return None
+    run = _simulated_as(case, penalty="printed")
+    return run if np.any(run.contacts.normal_force < 0.0) else None
+
+
+def unclamped_friction(case: SceneCase) -> Run | None:
+    """Records 1.5 times the friction force, which exceeds the bound of Coulomb's law."""
+    run = case.simulate()
+    contacts, mu = run.contacts, run.scene_resolved["contact"]["friction"]
+    length = np.linalg.norm(contacts.friction_force, axis=1)
+    slides = np.any((length > 0.0) & (length > 0.9 * mu * contacts.normal_force))
+    return replace(run, contacts=replace(contacts, friction_force=1.5 * contacts.friction_force)) if slides else None
+
+
+def explicit_friction(case: SceneCase) -> Run | None:
+    """Simulates (6) instead of Coulomb's law; for its threshold velocity the step is too long, so it drives bodies."""
+    contact = case.values["contact"]
+    if not contact.get("friction") or contact.get("friction_law") == "regularised":
+        return None
+    run = _simulated_as(case, friction_law="regularised", friction_velocity=1e-6)
+    return run if np.any(np.diff(run.energy["friction_work"]) > 0.0) else None
+
+
+def device_beyond_its_limits(case: SceneCase) -> Run | None:
+    """Gives the device the full force although the record states that it was limited."""
+    limit = (case.values.get("device") or {}).get("force_limit")
+    if limit is None or case.rendering == "full":
+        return None
+    run = replace(case, rendering="full").simulate()
+    beyond = bool(np.any(np.abs(run.device_force) > np.array(limit)))
+    return replace(run, law_settings=run.law_settings | {"rendering": case.rendering}) if beyond else None
+
+
+PLANTED_TRAJECTORY_FAULTS: dict[str, Callable[[SceneCase], Run | None]] = {
+    "finite": not_a_number,
+    "impact_energy": energised_impact,
+    "impulse_momentum": doubled_impulse,
+    "motion": lost_gravity,
+    "kinematics": moved_by_the_old_velocity,
+    "ledger": missing_half,
+    "penalty": unclamped_penalty,
+    "friction": unclamped_friction,
+    "friction_work": explicit_friction,
+    "device_limits": device_beyond_its_limits,
+}
+
+
+def first_occasion(law: str, scenes: list[SceneCase]) -> Run | None:
+    """Return the run with the law's fault in the first scene in which the fault has an effect, or None."""
+    return next((run for case in scenes if (run := PLANTED_TRAJECTORY_FAULTS[law](case)) is not None), None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,14 +16,6 @@ SUSPICIOUS = 1e-9  # relative gain in plain doubles; for κ(M) well above 1e4 th
 
 class ResolverFault(IapbError):
     """A resolver raised an exception, or returned no finite velocity of the right shape."""
-
-
-@dataclass(frozen=True)
-class Answer:
-    """Answer of one call: v⁺ (d,) or the fault, and the number of arguments that the call has changed."""
-
-    velocity: Floats | ResolverFault
-    changed: int
 
 
 class Watched:
@@ -50,28 +41,32 @@ class Watched:
             self.suspects.append((case, v_plus))
 
 
-def own_answer(resolver: Resolver, case: ImpactCase) -> Answer:
-    """Return the resolver's answer for the unchanged case; all laws of a case share one call."""
+def own_answer(resolver: Resolver, case: ImpactCase) -> tuple[Floats | ResolverFault, int]:
+    """Return v⁺ (d,) or the fault for the unchanged case, and how many arguments the call changed.
+
+    All laws of a case share one call.
+    """
     known = case._answers.get(id(resolver))
     if known is None:
         own, given = case.given(), case.given()
         velocity = _velocity(resolver, given, case)
         changed = sum(not np.array_equal(one, other) for one, other in zip(own, given, strict=True))
-        known = case._answers[id(resolver)] = resolver, Answer(velocity, changed)
-    return known[1]
+        known = case._answers[id(resolver)] = resolver, (velocity, changed)
+    answer: tuple[Floats | ResolverFault, int] = known[1]
+    return answer
 
 
 def own_outcome(resolver: Resolver, case: ImpactCase) -> Floats:
     """Return v⁺ (d,) of the unchanged case, from the call that all its laws share."""
-    velocity = own_answer(resolver, case).velocity
-    if isinstance(velocity, ResolverFault):
-        raise velocity
-    return velocity
+    return _usable(own_answer(resolver, case)[0])
 
 
 def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
     """Call the resolver on copies of the case's arrays and return v⁺ (d,), checked for shape and finiteness."""
-    velocity = _velocity(resolver, case.given(), case)
+    return _usable(_velocity(resolver, case.given(), case))
+
+
+def _usable(velocity: Floats | ResolverFault) -> Floats:
     if isinstance(velocity, ResolverFault):
         raise velocity
     return velocity

@@ -1,15 +1,24 @@
-"""Quantities of the trajectory claims, computed from one or two traces. Lengths in metres, angles in radians."""
+"""Quantities of the trajectory claims, from one or two traces of the peg. Lengths in metres, angles in radians.
+
+A `Trace` is the part of a run that the claims use. It is small, so that hundreds fit in memory, and plain, so that a
+test can write one by hand.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verification.scenes.trace import HALF_SIZE, Trace
+from iapb.run import Run
 
 Floats = NDArray[np.float64]
+
+COORDINATES = ("x", "y", "theta")
+HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
+UNITS = {"x": "m", "y": "m", "theta": "rad"}
 
 # The device has settled if it is slower than this in every coordinate: 1 mm/s and 0.01 rad/s are below a hundredth of
 # the peg's speed at contact (0.15 m/s), and a corner of the peg then moves by less than 3 micrometres per step.
@@ -19,6 +28,61 @@ SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
 # static penetration F_h / K, above the jitter of resting contacts
 LIFTED = 1e-5
 TOUCHING = 1e-6  # a corner touches the wall again below this [m]; rigid worlds keep contacts at zero up to rounding
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Trajectory, forces, contacts and impacts of one run; n steps, 3 coordinates (x, y, theta).
+
+    Attributes
+    ----------
+    time : (n + 1,) [s]
+    device, tool : (n + 1, 3) positions [m, rad]; device_velocity : (n + 1, 3)
+    device_force : (n, 3) force of the device's actuators [N, N m]
+    hand_force : (n, 3) [N, N m]
+    penetration : (n,) deepest overlap in the step [m], zero without overlap
+    new_contact : (n,) whether a contact began in the step
+    impact_step : (k,) steps with a collision; energy_lost : (k,) [J]; impact_scale : (k,) share of the impulse
+    kinetic_energy : (n + 1,) of the tool [J]
+    """
+
+    time: Floats
+    device: Floats
+    tool: Floats
+    device_velocity: Floats
+    device_force: Floats
+    hand_force: Floats
+    penetration: Floats
+    new_contact: NDArray[np.bool_]
+    impact_step: NDArray[np.int64]
+    energy_lost: Floats
+    impact_scale: Floats
+    kinetic_energy: Floats
+
+    @property
+    def dt(self) -> float:
+        """Step [s]."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def first_contact(self) -> int:
+        """Index of the step with the first contact; the number of steps if there is no contact."""
+        steps = np.flatnonzero(self.new_contact)
+        return int(steps[0]) if len(steps) else len(self.new_contact)
+
+
+def trace_of(run: Run) -> Trace:
+    """Return the trace of a run of the peg."""
+    step = np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
+    penetration, new_contact = np.zeros(run.steps), np.zeros(run.steps, np.bool_)
+    np.maximum.at(penetration, step, np.maximum(-run.contacts.gap, 0.0))
+    np.logical_or.at(new_contact, step, run.contacts.is_new)
+    body = run.scene_resolved["bodies"][0]
+    inertia = np.array([body["mass"], body["mass"], body["inertia"]])
+    return Trace(
+        run.time, run.device_q, run.q, run.device_v, run.device_force, run.hand_force, penetration, new_contact,
+        run.impacts.step, run.impacts.energy_lost, run.impacts.scale, 0.5 * (run.v**2) @ inertia,
+    )  # fmt: skip
 
 
 def settled_at(trace: Trace) -> int:
@@ -85,26 +149,20 @@ def largest_separation(trace: Trace) -> Floats:
 
 def bounces(trace: Trace) -> int:
     """Return the number of times that a corner of the device's peg leaves a wall after touching it."""
-    return sum(_departures(gap) for gap in corner_gaps(trace.device))
+    count = 0
+    for gap in corner_gaps(trace.device):
+        events = np.where(gap <= TOUCHING, 1, np.where(gap > LIFTED, -1, 0))
+        events = events[events != 0]
+        count += int(np.sum((events[:-1] == 1) & (events[1:] == -1)))
+    return count
 
 
 def corner_gaps(positions: Floats) -> list[Floats]:
     """Return the gap of each of the four corners to the right wall (x = 0) and to the floor (y = 0) over time [m]."""
     x, y, theta = positions.T
-    c, s = np.cos(theta), np.sin(theta)
-    gaps = []
-    for sign_a in (-1.0, 1.0):
-        for sign_b in (-1.0, 1.0):
-            a, b = sign_a * HALF_SIZE[0], sign_b * HALF_SIZE[1]
-            gaps += [x + a * c - b * s, -(y + a * s + b * c)]
-    return gaps
-
-
-def _departures(gap: Floats) -> int:
-    """Return the number of times that the gap exceeds LIFTED after it was at most TOUCHING."""
-    events = np.where(gap <= TOUCHING, 1, np.where(gap > LIFTED, -1, 0))
-    events = events[events != 0]
-    return int(np.sum((events[:-1] == 1) & (events[1:] == -1)))
+    c, s, (w, h) = np.cos(theta), np.sin(theta), HALF_SIZE
+    corners = ((-w, -h), (-w, h), (w, -h), (w, h))
+    return [gap for a, b in corners for gap in (x + a * c - b * s, -(y + a * s + b * c))]
 
 
 def share_limited(trace: Trace) -> float:

@@ -1,26 +1,146 @@
-"""Energy leaks of whole device loops at the hand's port, with coupling, delay and sensors, relative to b = KT/2 + |B|.
+"""The hand's port of a whole device scene: sensors, coupling, tool, contact law and actuators in the engine's loop.
 
-A hand moves the device back and forth by half a millimetre, at several shares of half the sampling rate. The motion is
-either so deep that the coupler always presses, or crosses the surface of the wall, in and out of contact.
+A hand moves the device along prescribed positions x_k, one per step. The loop answers with forces F_k, which the
+actuators hold until the next sample. As for the wall alone (`verification.laws.engine`), uniform motion
+between the positions dissipates least in the physical damping b, and the device's inertia only stores energy. The hand
+therefore supplies at least
+
+    E_n = Σ −F_k Δx_k + b Δx_k²/T,       and needed(n) = Σ F_k Δx_k / Σ Δx_k²/T
+
+is the least b with E_n >= 0. In the world CBuc with e = 0 and ideal sensors, if the tool rests on the wall, the coupler
+acts as a wall of stiffness K_cpl and damping B_cpl, so b >= K_cpl T/2 + B_cpl is sufficient. With the four-channel
+controller the tool moves, and the force depends on wall, coordination and the tool's inertia. No such bound is proved
+for this case; K and B are then the wall's constants, and the study measures the b that the loop needs.
+
+The tool does not receive the hand's force, since a force channel needs a sensor; the position channels and F_env act.
+
+The study moves the device back and forth by half a millimetre, at several shares of half the sampling rate. The motion
+is either so deep that the coupler always presses, or crosses the surface of the wall, in and out of contact.
 """
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from verification.finding import MIXED, REFUTED, Failure, Part, Table, of_each, table_of, titled
-from verification.stability.device_loop import (
-    COORDINATION,
-    COUPLER_WORLD,
-    DeviceLoop,
-    Floats,
-    actuator_forces,
-    entered_energy,
-    needed_damping,
-)
+from iapb.haptics.device import DeviceReading
+from iapb.scene import Scene, scene_from_text
+from iapb.simulation import Simulation
+from reference.worlds import find_world
+from verification.check import Check, Study
+from verification.finding import MIXED, REFUTED, Part
+from verification.impacts import Floats
+from verification.table import Table
+
+COUPLER_WORLD = "CBuc"
+RADIUS = 0.01  # [m] of the tool, a disc that slides along x; the wall is at 0
+COORDINATION = (100.0, 70.0)  # Table I: K_coord [N/m], B_coord [N s/m]
+
+
+@dataclass(frozen=True)
+class DeviceLoop:
+    """A device and a tool in front of a wall (SI units).
+
+    stiffness, damping : constants of the wall in the four-channel worlds, of the coupler in CBuc
+    dt : the step T; mass, clearance : mass of the tool, and its initial distance from the wall
+    delay : delay of the readings and of the forces [steps each]; resolution : of the position sensor
+    """
+
+    world: str
+    stiffness: float
+    damping: float
+    dt: float = 1.0 / 512.0
+    mass: float = 2.0
+    clearance: float = 1e-3
+    delay: int = 0
+    resolution: float = 0.0
+
+    @property
+    def bound(self) -> float:
+        """KT/2 + |B|: the lower bound on b in Colgate and Schenkel's condition [N s/m]."""
+        return 0.5 * self.stiffness * self.dt + abs(self.damping)
+
+    @property
+    def bound_with_coordination(self) -> float:
+        """KT/2 + |B| with the gains of the coordination, if there is one, added to those of the wall [N s/m]."""
+        if self.world == COUPLER_WORLD:
+            return self.bound
+        return self.bound + 0.5 * COORDINATION[0] * self.dt + COORDINATION[1]
+
+    def scene(self) -> Scene:
+        """Return the scene with tool, wall and gains; e = 0."""
+        own, gains = [self.stiffness, self.damping], COORDINATION
+        wall = {"stiffness": own[0], "damping": own[1]} if self.world != COUPLER_WORLD else {}
+        couplings = {"four_channel": {"stiffness": [gains[0]], "damping": [gains[1]]},
+                     "unilateral": {"stiffness": own[:1], "damping": own[1:]}}  # fmt: skip
+        return scene_from_text(json.dumps({
+            "name": "device_loop", "rate": 1.0 / self.dt, "duration": 1.0,
+            "bodies": [{"name": "tool", "joint": "prismatic", "axis": [1, 0], "mass": self.mass,
+                        "shapes": [{"kind": "circle", "radius": RADIUS}], "position": [-RADIUS - self.clearance]}],
+            "walls": [{"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [-1, 0]}],
+            "contact": {"forces": "paper", "restitution": 0.0, **wall}, "device": {}, "couplings": couplings,
+            "hand": {"body": "tool", "force": [0, 0, 0]},
+        }))  # fmt: skip
+
+
+class MovedDevice:
+    """A device that a hand moves along positions (n + 1,), read through sensors; it records the forces applied to it.
+    """
+
+    def __init__(self, positions: Floats, loop: DeviceLoop) -> None:
+        step = loop.resolution
+        sensed = np.round(positions / step) * step if step > 0.0 else positions
+        rate = np.concatenate([[0.0], np.diff(sensed)]) / loop.dt
+        late = np.zeros(loop.delay)
+        self._q, self._v = np.concatenate([late + sensed[0], sensed]), np.concatenate([late, rate])
+        self._forces: list[float] = []
+
+    def read(self) -> DeviceReading:
+        """Return the quantised, delayed position, and its difference over one step as the velocity."""
+        k = len(self._forces)
+        return DeviceReading(self._q[k : k + 1].copy(), self._v[k : k + 1].copy())
+
+    def apply(self, force: ArrayLike) -> None:
+        """Record the force and advance the hand by one step."""
+        self._forces.append(float(np.asarray(force)[0]))
+
+    def held_forces(self, delay: int) -> Floats:
+        """Return the actuator force of each step: the command of `delay` steps before, and 0 in the first steps."""
+        return np.array([0.0] * delay + self._forces)[: len(self._forces)]
+
+
+def actuator_forces(loop: DeviceLoop, positions: Floats) -> Floats:
+    """Return the actuator forces (n,) [N] of the steps for positions (n + 1,) [m].
+
+    Position 0 is where the tool touches the wall; positive is into the wall. The tool starts at rest at its clearance
+    from the wall; the positions should start there, too.
+    """
+    scene, world = loop.scene(), find_world(loop.world)
+    device = MovedDevice(positions - RADIUS, loop)
+    simulation = Simulation(scene, world.law, world.coupling_in(scene), device=device)
+    for _ in range(len(positions) - 1):
+        simulation.step()
+    return device.held_forces(loop.delay)
+
+
+def entered_energy(positions: Floats, forces: Floats, device_damping: float, dt: float) -> Floats:
+    """Return the least energy (n,) [J] that the hand has supplied by the end of each step."""
+    change = np.diff(positions)
+    return np.asarray(np.cumsum(-forces * change + device_damping * change**2 / dt))
+
+
+def needed_damping(positions: Floats, forces: Floats, dt: float) -> float:
+    """Return the least b [N s/m] for which the hand extracts no energy on this motion."""
+    change = np.diff(positions)
+    got_out, moved = np.cumsum(forces * change), np.cumsum(change**2) / dt
+    shares = np.divide(got_out, moved, out=np.zeros_like(moved), where=moved > 0.0)
+    return max(0.0, float(np.max(shares)))
+
 
 HALF = 5e-4  # [m] amplitude of the motion
 # (world, K [N/m], B [N s/m]): the paper's coupler and walls, also without damping; and a wall 16 times as stiff
@@ -37,35 +157,15 @@ MOTIONS = (PRESSES, CROSSES)
 _STEPS = 200
 
 
-COLUMNS = titled((
-    "world", "stiffness [N/m]", "damping [N s/m]", "sensors", "the hand", "KT/2 + |B| [N s/m]",
-    "with the coordination's gains [N s/m]", "damping needed [N s/m]", "needed / bound", "leak at the bound [mJ]",
-    "leak / energy exchanged",
-)).columns  # fmt: skip
+Case = tuple[tuple[str, float, float], str, str]  # wall, sensors, motion
 
 
-def device_port_leaks(depth: str = "quick", failures: list[Failure] | None = None) -> Table:
-    """Measure the energy leak for every wall, sensor and kind of motion."""
-
-    def leak(case: tuple[tuple[str, float, float], str, str]) -> list[dict[str, Any]]:
-        wall, sensors, kind = case
-        delay, resolution = SENSORS[sensors]
-        return [_worst(DeviceLoop(*wall, delay=delay, resolution=resolution), sensors, kind, SPEEDS[depth])]
-
-    def name(case: tuple[tuple[str, float, float], str, str]) -> str:
-        (world, K, B), sensors, kind = case
-        return f"hand's port in {world}, K = {K:g} N/m, B = {B:g} N s/m, {sensors} sensors, the hand {kind}"
-
-    note = ("The complete device loop at 512 Hz. The hand moves to and fro by 0.5 mm; the worst of several speeds is "
-            "shown. Stiffness and damping are the coupler's in CBuc, else the wall's, with the coordination gains of "
-            "Table I. Leak: energy that the hand draws from the loop at b = KT/2 + |B|.")
-    return table_of(COLUMNS, of_each(product(WALLS[depth], SENSORS, MOTIONS), leak, failures, name), note=note)
-
-
-def _worst(loop: DeviceLoop, sensors: str, kind: str, speeds: tuple[float, ...]) -> dict[str, Any]:
+def _leak(study: Study, case: Case) -> dict[str, Any]:
     """Return the least damping without a leak, and the largest leak at b = KT/2 + |B|, over all speeds."""
-    needed, leak, turned_over = 0.0, 0.0, 0.0
-    for share in speeds:
+    wall, sensors, kind = case
+    delay, resolution = SENSORS[sensors]
+    loop, needed, leak, turned_over = DeviceLoop(*wall, delay=delay, resolution=resolution), 0.0, 0.0, 0.0
+    for share in SPEEDS[study.depth]:
         x = hand_positions(loop, kind, share)
         forces = actuator_forces(loop, x)
         needed = max(needed, needed_damping(x, forces, loop.dt))
@@ -73,11 +173,12 @@ def _worst(loop: DeviceLoop, sensors: str, kind: str, speeds: tuple[float, ...])
         turned = 2.0 * loop.bound * float(np.sum(np.diff(x) ** 2)) / loop.dt
         leak, turned_over = max((leak, turned_over), (came_out, turned))
     return {
-        "world": loop.world, "stiffness": loop.stiffness, "damping": loop.damping, "sensors": sensors,
-        "the hand": kind, "KT/2 + |B|": loop.bound, "with the coordination's gains": loop.bound_with_coordination,
-        "damping needed": needed, "needed / bound": needed / loop.bound, "leak at the bound": 1e3 * leak,
+        "world": loop.world, "stiffness [N/m]": loop.stiffness, "damping [N s/m]": loop.damping, "sensors": sensors,
+        "the hand": kind, "KT/2 + |B| [N s/m]": loop.bound,
+        "with the coordination's gains [N s/m]": loop.bound_with_coordination, "damping needed [N s/m]": needed,
+        "needed / bound": needed / loop.bound, "leak at the bound [mJ]": 1e3 * leak,
         "leak / energy exchanged": leak / turned_over if leak else 0.0,
-    }  # fmt: skip
+    }
 
 
 def coupled(ports: Table) -> Part:
@@ -119,3 +220,13 @@ def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:
     start = -loop.clearance
     way = np.linspace(start, middle + HALF, 1 + round(10.0 * (middle + HALF - start) / HALF), endpoint=False)
     return np.concatenate([way, middle + swing])
+
+
+PORT = Check(
+    key="hand port", question="How much damping does the device need so that the hand draws no energy from the loop?",
+    cases=lambda study: product(WALLS[study.depth], SENSORS, MOTIONS), row=_leak,
+    says=lambda table: (coupled(table), coordinated(table)),
+    note="The complete device loop at 512 Hz. The hand moves to and fro by 0.5 mm; the worst of several speeds is "
+    "shown. Stiffness and damping are the coupler's in CBuc, else the wall's, with the coordination gains of Table I. "
+    "Leak: energy that the hand draws from the loop at b = KT/2 + |B|.",
+)

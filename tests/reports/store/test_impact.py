@@ -18,14 +18,14 @@ from reports.store import read_run
 from reports.store.care import PARTIAL, check_store
 from reports.store.impact import read_broken_impact
 from reports.store.io import new_file
+from tests.verification.laws.faults import returns_too_much
 from verification.impacts import ImpactCase
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, UNEQUAL, Batch, Found, drawn
 from verification.laws.counterexample import strike
-from verification.laws.planted import returns_too_much
 
 # The planted fault: 1e-4 too much of every impulse, computed in exact rationals, so that no BLAS has a say.
-FAULTY = CampaignRequest("verification.laws.planted:returns_too_much", "KIT", 1e8, 600, 0, 0, 1)
+FAULTY = CampaignRequest("tests.verification.laws.faults:returns_too_much", "KIT", 1e8, 600, 0, 0, 1)
 BATCH = Batch(IMPACTS, 471, 1)  # elastic, so it gains energy
 
 
@@ -116,7 +116,7 @@ def test_the_engines_own_laws_of_impacts_are_runs_too(part: str, tmp_path: Path)
 
 
 def test_a_resolver_that_raises_leaves_no_velocity_and_its_words(tmp_path: Path) -> None:
-    request = replace(FAULTY, resolver="verification.laws.planted:gives_up")
+    request = replace(FAULTY, resolver="tests.verification.laws.faults:gives_up")
     case = drawn(IMPACTS, 3, request.subject())
     path = _keep(IMPACTS, case, request, "kinetic_energy", tmp_path / "kept")
     broken = read_broken_impact(path)

@@ -9,10 +9,15 @@ import pytest
 
 from iapb.errors import ArgumentError, MissingDependencyError
 from reference.simulators import find_simulator, fixed_scene
-from verification.engines import compare_engines, sentence, study, verdict
-from verification.engines.study import measured
-from verification.engines.verdict import finding
-from verification.finding import NOT_TESTABLE, REPRODUCED
+from verification import engines
+from verification.engines import ERRORS, compare_engines, measured, row_of, sentence, verdict
+from verification.finding import NOT_TESTABLE, REPRODUCED, verdict_of
+
+
+def judged(records):
+    table = ERRORS.table_of(map(row_of, records))
+    parts = ERRORS.sentences(table)
+    return parts, engines.engines.says({"errors": table}, parts)
 
 
 @pytest.fixture(scope="module")
@@ -57,13 +62,13 @@ def test_an_engine_that_is_absent_is_named_and_not_left_out(monkeypatch):
             raise MissingDependencyError("absent", "The adapter", "pip install absent")
 
     present = compare_engines(["iapb"], ["redundant_wedge"])
-    monkeypatch.setattr(study, "find_simulator", lambda name: Absent())
+    monkeypatch.setattr(engines, "find_simulator", lambda name: Absent())
     records = compare_engines(["mujoco"], ["resting_box"])
     assert [verdict(record) for record in records] == ["not installed"] * 2
     assert "pip install absent" in sentence(records)
-    found = finding([*present, *records])
-    assert (found.parts[-1].verdict, found.verdict) == (NOT_TESTABLE, REPRODUCED)
-    assert "Absent" in found.parts[-1].sentence
+    parts, _ = judged([*present, *records])
+    assert (parts[-1].verdict, verdict_of(parts)) == (NOT_TESTABLE, REPRODUCED)
+    assert "Absent" in parts[-1].sentence
 
 
 def breaks(*_):
@@ -95,7 +100,7 @@ def test_the_answer_names_every_miss_ours_first():
     (ours, _) = compare_engines(["iapb"], ["redundant_wedge"])
     moved = replace(ours, rests=True, drift=97.0, scene="heavy_stack")
     other = replace(ours, engine="other", title="Another", rests=True, drift=5.7, choice="matched")
-    answer = finding([other, moved]).answer
-    assert answer.endswith("Missed by iapb (ours): heavy stack at own settings (moves by 97 m); "
-                           "by Another: redundant wedge at 1 ms (moves by 5.7 m).")
-    assert "Missed" not in finding([ours]).answer
+    _, answer = judged([other, moved])
+    assert answer.endswith("Missed by iapb (ours): heavy stack moves by 97 m at own settings; "
+                           "by Another: redundant wedge moves by 5.7 m at 1 ms.")
+    assert "Missed" not in judged([ours])[1]

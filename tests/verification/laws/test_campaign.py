@@ -7,7 +7,7 @@ import pytest
 
 from iapb import resolve_impact
 from verification.impacts import Floats, ImpactCase
-from verification.laws.bounds import FACTORED, KIT, LawResidual
+from verification.laws.bounds import FACTORED, KIT, LawCount, LawResidual
 from verification.laws.campaign import (
     IMPACTS,
     OF_ONE_CALL,
@@ -20,9 +20,8 @@ from verification.laws.campaign import (
     residuals,
     tried_laws,
 )
-from verification.laws.impact_laws import LAWS, UNEQUAL_LAWS
-from verification.laws.kit import RunningCount
-from verification.laws.planted import PLANTED_BUGS
+from verification.laws.equality import LAWS, UNEQUAL_LAWS
+from verification.laws.planted import makes_warm_start, wrong_sign
 from verification.laws.resolver import own_outcome, sound_resolver
 
 SUBJECT = Subject(sound_resolver, KIT, 1e8)
@@ -57,15 +56,14 @@ def test_what_is_remembered_is_a_copy_and_belongs_to_its_resolver() -> None:
     first = own_outcome(resolver, case)
     resolver.buffer[:] = 7.0
     assert np.array_equal(own_outcome(resolver, case), first) and first[0] == 0.5
-    backwards = PLANTED_BUGS["wrong_sign"].make()
-    assert own_outcome(backwards, case)[0] != first[0]
+    assert own_outcome(wrong_sign, case)[0] != first[0]
 
 
 def test_repeatability_asks_again() -> None:
     resolver, case = _Counting(), _fresh()
     assert LAWS["repeatability"].check(case, resolver, KIT).passed
     assert resolver.calls == 3
-    warm = PLANTED_BUGS["warm_start"].make()
+    warm = makes_warm_start()
     own_outcome(warm, case)
     assert not LAWS["repeatability"].check(case, warm, KIT).passed
 
@@ -101,10 +99,9 @@ def test_a_batch_counts_what_it_has_tried() -> None:
 
 
 def test_the_worst_is_the_one_furthest_above_its_tolerance() -> None:
-    running = RunningCount()
-    kept = [running.add(LawResidual("", value, 1.0)) for value in (0.5, np.nan, 2.0)]
+    count = LawCount("any")
+    kept = [count.add(LawResidual("", value, 1.0)) for value in (0.5, np.nan, 2.0)]
     assert kept == [True, False, False]
-    count = running.count("any")
     assert (count.checked, count.failures) == (3, 2) and count.worst is not None and np.isnan(count.worst.value)
 
 

@@ -10,17 +10,24 @@ import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import ArgumentError
+from tests.verification.laws.faults import (
+    PUSHING,
+    SOUND,
+    TOO_MUCH,
+    friction_of_one_alone,
+    moreau,
+    newton,
+    no_friction,
+    returns_too_much,
+)
 from verification import check_passivity
-from verification.impacts import Floats, ImpactCase, draw_frictional_case
+from verification.impacts import ImpactCase, draw_frictional_case
 from verification.laws import CONTRACTS, sound_resolver
 from verification.laws.bounds import ONE_SIDED
-from verification.laws.contracts import distance_from_cone, sliding_dissipates_most
-from verification.laws.planted import TOO_MUCH, returns_too_much
-from verification.laws.planted_contracts import PLANTED, SOUND, moreau, newton
+from verification.laws.contracts import FRICTIONAL_LAWS, distance_from_cone
 
 SOUND_ONES = [(contract, resolver) for contract, resolvers in SOUND.items() for resolver in resolvers]
 SOUND_ONES.append(("unilateral", partial(resolve_impact, method="poisson")))
-BUGS = [(contract, name) for contract, bugs in PLANTED.items() for name in bugs]
 
 
 @pytest.mark.parametrize(("contract", "resolver"), SOUND_ONES)
@@ -31,14 +38,13 @@ def test_textbook_resolvers_keep_all_laws_of_their_contract(contract: str, resol
     assert all(verdict.checked > 0 for verdict in report.verdicts)
 
 
-@pytest.mark.parametrize(("contract", "name"), BUGS)
+@pytest.mark.parametrize(("contract", "name"), PUSHING)
 def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> None:
-    bug = PLANTED[contract][name]
-    report = check_passivity(bug.make(), contract=contract, laws=[bug.caught_by], impacts=80, search=10)
-    assert report.broken_laws == (bug.caught_by,)
-    scope: dict[str, object] = {"resolver": bug.make()}
-    with pytest.raises(AssertionError, match=bug.caught_by):
-        exec(report.counterexample_test + f"\n\ntest_{bug.caught_by}()", scope)
+    law, resolver = PUSHING[contract, name]
+    report = check_passivity(resolver, contract=contract, laws=[law], impacts=80, search=10)
+    assert report.broken_laws == (law,)
+    with pytest.raises(AssertionError, match=law):
+        exec(report.counterexample_test + f"\n\ntest_{law}()", {"resolver": resolver})
 
 
 def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
@@ -65,8 +71,8 @@ def test_the_distance_from_the_cones_is_known_for_one_contact_in_space() -> None
 
 
 def test_friction_at_several_contacts_is_judged_without_being_named() -> None:
-    alone = PLANTED["frictional"]["friction_of_one_alone"].make()
-    assert check_passivity(alone, contract="frictional", impacts=40, search=0).broken_laws == ("maximal_dissipation",)
+    report = check_passivity(friction_of_one_alone, contract="frictional", impacts=40, search=0)
+    assert report.broken_laws == ("maximal_dissipation",)
 
 
 def test_a_passed_report_says_what_it_does_not_judge() -> None:
@@ -114,12 +120,8 @@ def test_what_would_judge_nothing_is_refused(options: dict[str, object], message
     assert message in str(caught.value)
 
 
-def _pulling(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    return PLANTED["unilateral"]["pulls"].make()(M, J, v, e)
-
-
 def test_a_broken_report_raises_with_the_matrices_and_what_came_back() -> None:
-    report = check_passivity(_pulling, contract="unilateral", laws=["pushing"], impacts=30, search=30)
+    report = check_passivity(sound_resolver, contract="unilateral", laws=["pushing"], impacts=30, search=30)
     with pytest.raises(AssertionError) as caught:
         report.raise_if_broken()
     text = str(caught.value)
@@ -136,8 +138,7 @@ def test_a_report_travels_between_processes() -> None:
 
 
 def test_a_counterexample_with_friction_shrinks_to_one_contact() -> None:
-    report = check_passivity(PLANTED["frictional"]["no_friction"].make(), contract="frictional", laws=["sticking"],
-                             impacts=60, search=60)  # fmt: skip
+    report = check_passivity(no_friction, contract="frictional", laws=["sticking"], impacts=60, search=60)
     case = report.counterexample
     assert case.contacts == 1 and case.tangents.shape == (1, 1, case.coordinates) and case.coordinates == 2
     assert "  T = [[[" in report and "  μ = [" in report
@@ -147,5 +148,5 @@ def test_a_counterexample_with_friction_shrinks_to_one_contact() -> None:
 def test_sliding_is_at_the_limit_of_coulombs_law(number: int) -> None:
     """The law on the sound resolver by itself: 0 to rounding, and not for half of the friction."""
     case = draw_frictional_case(np.random.default_rng(number), number)
-    found = sliding_dissipates_most(case, moreau, ONE_SIDED)
+    found = FRICTIONAL_LAWS["maximal_dissipation"].check(case, moreau, ONE_SIDED)
     assert found is None or found.passed

@@ -11,7 +11,7 @@ from hypothesis import given
 from iapb import resolve_impact
 from verification.impacts import ImpactCase
 from verification.laws.bounds import FACTORED, KIT, LawResidual
-from verification.laws.impact_laws import LAWS
+from verification.laws.equality import LAWS
 from verification.laws.resolver import Resolver, sound_resolver
 from verification.laws.strategies import impact_cases
 from verification.methods import damped, svd

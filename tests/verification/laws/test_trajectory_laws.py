@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 
 from reports.store import read_run, write_run
-from verification.laws.planted_runs import PLANTED_TRAJECTORY_FAULTS, first_occasion
+from verification.laws.bounds import relative_gain
+from verification.laws.planted import PLANTED_TRAJECTORY_FAULTS, first_occasion
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
 from verification.laws.strategies import scenes, scenes_in_space
-from verification.laws.trajectory_laws import TRAJECTORY_LAWS, Trajectory, _gain, judge_run
+from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory, judge_run
 
 STEPS = 200
 
@@ -62,8 +63,8 @@ def test_scenes_in_space_have_boxes_balls_stacks_and_linkages_that_touch() -> No
 
 def test_a_gain_beyond_the_range_of_double_double_is_judged_exactly() -> None:
     before, after = np.array([1e70, 1e-5]), np.array([1e70, 1e-5])
-    assert _gain(np.eye(2), before, after) == 0.0
-    assert _gain(np.eye(2), before, 2.0 * after) == 3.0
+    assert relative_gain(np.eye(2), before, after) == 0.0
+    assert relative_gain(np.eye(2), before, 2.0 * after) == 3.0
 
 
 @pytest.mark.parametrize("law", TRAJECTORY_LAWS)

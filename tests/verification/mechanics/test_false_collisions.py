@@ -16,7 +16,7 @@ from verification.mechanics.false_collisions import (
     filters,
     socket,
 )
-from verification.scenes.energy_books import open_books
+from verification.scenes.books import open_books
 
 
 def by_filters(damping: float) -> dict[tuple[bool, bool], FalseCollisions]:

@@ -11,7 +11,7 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from iapb.simulation import simulate
 from reference.worlds import run_world
-from verification.scenes.energy_books import (
+from verification.scenes.books import (
     OPEN_SHARE,
     OpenBooks,
     contact_energy,
@@ -24,7 +24,7 @@ from verification.scenes.energy_books import (
     scene_of,
     total,
 )
-from verification.scenes.ledger import MOVES, SETTLES, measure
+from verification.scenes.ledger import MOVES, SETTLES, contact_row
 
 SCENES = ("wall_1d", "peg_corner", "arm_pushing", "tumbling_body", "newton_cradle", "peg_hole_space")
 
@@ -75,7 +75,7 @@ def test_springs_hold_what_the_static_overlap_says(runs: dict[str, Run]) -> None
     held = contact_energy(run, scene)[0][-1]
     assert held == pytest.approx(0.4**2 / (2 * scene.contact.stiffness), rel=1e-3)
     series = energy_series(run)
-    assert np.all(np.diff(series.lost_damping) > -1e-6 * series.lost_damping[-1] - 1e-9)
+    assert np.all(np.diff(series["lost damping"]) > -1e-6 * series["lost damping"][-1] - 1e-9)
 
 
 def test_dampers_are_nothing_without_damping(runs: dict[str, Run]) -> None:
@@ -83,11 +83,11 @@ def test_dampers_are_nothing_without_damping(runs: dict[str, Run]) -> None:
 
 
 def test_endings_and_counts(runs: dict[str, Run]) -> None:
-    found = {name: measure(run) for name, run in runs.items()}
+    found = {name: contact_row(run) for name, run in runs.items()}
     assert found["peg_corner"]["how it ends"] == SETTLES and found["tumbling_body"]["how it ends"] == MOVES
     assert found["peg_hole_space"]["dimensions"] == 3 and found["peg_corner"]["dimensions"] == 2
     assert found["peg_hole_space"]["most rows in one impact"] >= 20  # tens of simultaneous collisions
-    assert found["tumbling_body"]["most penetration"] == 0.0 < found["peg_corner"]["most penetration"]
+    assert found["tumbling_body"]["most penetration [mm]"] == 0.0 < found["peg_corner"]["most penetration [mm]"]
 
 
 def test_open_books_fall_with_the_declared_order_and_a_fixed_error_does_not() -> None:

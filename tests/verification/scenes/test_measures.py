@@ -6,6 +6,7 @@ import pytest
 from verification.claims.conditions import TIGHT, Condition, drawn, limited_conditions, start_conditions
 from verification.finding import Region
 from verification.scenes.measures import (
+    Trace,
     bounces,
     comparison_window,
     corner_gaps,
@@ -17,7 +18,6 @@ from verification.scenes.measures import (
     root_mean_square,
     settling_time,
 )
-from verification.scenes.trace import Trace
 
 STEPS, DT = 100, 0.01
 

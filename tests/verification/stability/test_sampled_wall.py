@@ -8,8 +8,18 @@ import pytest
 from iapb.errors import ArgumentError
 from verification.check import Study
 from verification.claims import CLAIMS
-from verification.stability.maps import GROWS, PAPER_DAMPING, StabilityMap, grid, walls
-from verification.stability.sampled_wall import IMPULSES, LAWS, PENALTY, Loop, _held_force, touch_walls
+from verification.stability.walls import (
+    GROWS,
+    IMPULSES,
+    LAWS,
+    PAPER_DAMPING,
+    PENALTY,
+    Loop,
+    _held_force,
+    grid,
+    maps_of,
+    touch_walls,
+)
 
 
 def at(loop: Loop, stiffness: float, damping: float, law: str):  # type: ignore[no-untyped-def]
@@ -56,9 +66,7 @@ def test_rate_hardness_of_an_impulse_does_not_know_the_wall() -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_no_wall_within_the_condition_makes_the_hand_faster(law: str) -> None:
-    loop, (stiffness, damping) = Loop(device_damping=5.0), grid("quick")
-    K, B = walls(stiffness, damping)
-    found = StabilityMap(loop, law, stiffness, damping, touch_walls(loop, K, B, law))
+    found = maps_of(Loop(device_damping=5.0), *grid("quick"))[LAWS.index(law)]
     assert found.passive.any() and not found.passive.all()
     outcomes = np.array(found.outcomes)
     if law == PENALTY:

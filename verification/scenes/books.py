@@ -29,41 +29,17 @@ Book = Mapping[str, float]
 REFINEMENTS = (1, 2, 4)  # divisors of the scene's step
 ROUNDING = 1e-12  # share of the total energy that bounds the rounding of some thousand sums in double precision
 ORDER_SLACK = 0.25  # tolerance below the declared order, because collision times change with the step
-BOOK = (
-    "kinetic, start [J]", "potential, start [J]", "in contact springs, start [J]", "kinetic, end [J]",
-    "potential, end [J]", "in contact springs, end [J]", "work of the hand [J]", "work of the coupling [J]",
-    "lost in impacts [J]", "lost in contact damping [J]", "lost in friction [J]", "residual: motion [J]",
-    "residual: springs [J]", "energy exchanged [J]", "residual by size, share of the energy exchanged [%]",
-    "most energy beyond what was put in [%]",
-)  # fmt: skip
 OPEN_SHARE, GAIN_SHARE = "residual by size, share of the energy exchanged", "most energy beyond what was put in"
 _HELD = ("kinetic", "potential", "in contact springs")
 
 
-@dataclass(frozen=True)
-class EnergySeries:
-    """Energies at every instant (n + 1,) [J]: stored energies, and work and losses accumulated so far."""
-
-    kinetic: Floats
-    potential: Floats
-    springs: Floats
-    given: Floats
-    lost_impacts: Floats
-    lost_damping: Floats
-    lost_friction: Floats
-
-
-def energy_series(run: Run) -> EnergySeries:
-    """Return the energies of a run over time."""
+def energy_series(run: Run) -> dict[str, Floats]:
+    """Return the energies at every instant (n + 1,) [J]: stored energies, and work and losses accumulated so far."""
     ledger, (springs, damping_work) = run.energy, contact_energy(run, scene_of(run))
-
-    def so_far(sums: Floats) -> Floats:
-        return np.append(0.0, sums)
-
-    return EnergySeries(
-        ledger["kinetic"], ledger["potential"], springs, so_far(ledger["hand_work"] + ledger["coupling_work"]),
-        so_far(ledger["impact_loss"]), so_far(-damping_work), so_far(-ledger["friction_work"]),
-    )  # fmt: skip
+    sums = {"given": ledger["hand_work"] + ledger["coupling_work"], "lost impacts": ledger["impact_loss"],
+            "lost damping": -damping_work, "lost friction": -ledger["friction_work"]}
+    stored = {"kinetic": ledger["kinetic"], "potential": ledger["potential"], "springs": springs}
+    return stored | {name: np.append(0.0, values) for name, values in sums.items()}
 
 
 def scene_of(run: Run) -> Scene:
@@ -72,29 +48,29 @@ def scene_of(run: Run) -> Scene:
 
 
 def energy_book(run: Run) -> dict[str, float]:
-    """Return the energy balance of a run: the quantities of BOOK by key.
+    """Return the energy balance of a run: the quantities by name, in joules or per cent.
 
     `iapb.mechanics.energy` records the work of the penalties as one sum. This function splits it into the energy in the
     springs at the end, the work of the dampers, and the remainder, which is the error of one spring evaluation per
     step.
     """
     series, ledger, turned = energy_series(run), run.energy, turned_over(run)
-    parts = dict(zip(_HELD, (series.kinetic, series.potential, series.springs), strict=True))
-    held = series.kinetic + series.potential + series.springs
-    work_of_springs = float(ledger["penalty_work"][-1] + series.lost_damping[-1])
+    springs, damping = series["springs"], series["lost damping"][-1]
+    parts = dict(zip(_HELD, (series["kinetic"], series["potential"], springs), strict=True))
+    held = series["kinetic"] + series["potential"] + springs
     book = {f"{name}, {when}": float(values[place])
-            for name, values in parts.items() for when, place in (("start", 0), ("end", -1))}  # fmt: skip
+            for when, place in (("start", 0), ("end", -1)) for name, values in parts.items()}
     book |= {
         "work of the hand": float(ledger["hand_work"][-1]), "work of the coupling": float(ledger["coupling_work"][-1]),
-        "lost in impacts": float(series.lost_impacts[-1]) + 0.0,  # + 0.0 turns −0.0 into 0.0
-        "lost in contact damping": float(series.lost_damping[-1]) + 0.0,
-        "lost in friction": float(series.lost_friction[-1]) + 0.0,
+        "lost in impacts": float(series["lost impacts"][-1]) + 0.0,  # + 0.0 turns −0.0 into 0.0
+        "lost in contact damping": float(damping) + 0.0, "lost in friction": float(series["lost friction"][-1]) + 0.0,
         "residual: motion": float(ledger["integration_residual"][-1]),
-        "residual: springs": work_of_springs + float(series.springs[-1] - series.springs[0]),
+        "residual: springs": float(ledger["penalty_work"][-1] + damping) + float(springs[-1] - springs[0]),
         "energy exchanged": turned,
-    }  # fmt: skip
-    gain = float((held - held[0] - series.given).max())
-    return book | {OPEN_SHARE: 100 * share(left_open(book), turned), GAIN_SHARE: 100 * share(gain, turned)}
+    }
+    gain = float((held - held[0] - series["given"]).max())
+    shares = {OPEN_SHARE: left_open(book), GAIN_SHARE: gain}
+    return book | {name: 100 * (part / turned) if turned else 0.0 for name, part in shares.items()}
 
 
 def turned_over(run: Run) -> float:
@@ -104,11 +80,6 @@ def turned_over(run: Run) -> float:
     candidates = [ledger["kinetic"].max(), np.ptp(ledger["potential"])]
     candidates += [np.abs(ledger[name]).max(initial=0.0) for name in ("hand_work", "coupling_work")]
     return float(max(candidates))
-
-
-def share(part: float, whole: float) -> float:
-    """Return part / whole, or 0 if whole is 0."""
-    return part / whole if whole > 0.0 else 0.0
 
 
 def left_open(book: Book) -> float:
@@ -146,7 +117,7 @@ class OpenBooks:
     @property
     def falls_as_declared(self) -> bool:
         """Whether the residual is rounding or falls at least with the declared order."""
-        return self.order is None or self.order >= self.declared_order - ORDER_SLACK
+        return as_declared(self.order, self.declared_order)
 
     def step_for(self, wanted: float) -> float | None:
         """Return a step [s] whose residual is at most the share `wanted`: a tested step or one from the measured order.
@@ -157,6 +128,11 @@ class OpenBooks:
         if self.order is None or self.order <= 0.0:
             return None
         return self.step / self.refinements[-1] * (wanted / self.open_shares[-1]) ** (1.0 / self.order)
+
+
+def as_declared(order: float | None, declared: int) -> bool:
+    """Whether a measured order is at least the declared one; None is the order of rounding."""
+    return order is None or order >= declared - ORDER_SLACK
 
 
 def measured_order(first: float, last: float, refinement: float) -> float:
@@ -180,7 +156,7 @@ def open_books(
     done = tuple(refinements[: len(books)])
     falls = None if len(done) < 2 else measured_order(left_open(books[0]), left_open(books[-1]), done[-1] / done[0])
     return OpenBooks(scene.name, 1.0 / scene.rate, done, tuple(book[OPEN_SHARE] / 100 for book in books),
-                     INTEGRATORS[run.law_settings["integrator"]].order, falls)  # fmt: skip
+                     INTEGRATORS[run.law_settings["integrator"]].order, falls)
 
 
 def contact_energy(run: Run, scene: Scene) -> tuple[Floats, Floats]:

@@ -19,13 +19,18 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 
 Floats = NDArray[np.float64]
-PENALTY, IMPULSES = "penalty", "impulses"
-LAWS = (PENALTY, IMPULSES)
+PENALTY, IMPULSES = LAWS = ("penalty", "impulses")
+SETTLES, BOUNCES_ON, GROWS = "settles", "bounces on", "grows"
+PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 
 SETTLED_SPEED = 1e-3  # [m/s] as in the claims: a hundredth of the speed at contact
 GROWN = 1.05  # neither rounding nor the hand alone explains speeds above this multiple of the initial speed
 _SMALL = 1e-4  # for smaller c, T − φ suffers from cancellation, and three terms of the series err by c³/6 < 2e-13
 _LAST = 0.25  # share of the time, at its end, in which a settled mass must be still
+
+# Emulated encoder with a resolution of 1 µm, and a delay of one sample each way, as in the report's device runs.
+LATE = (1, 1e-6)  # delay [samples], resolution [m]
+GRIDS = {"quick": (17, 14), "full": (49, 40)}  # stiffnesses, dampings
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,9 @@ class Loop:
     resolution: float = 0.0
     restitution: float = 0.0
     seconds: float = 3.0
+
+    def __str__(self) -> str:
+        return f"{self.rate:g} Hz, delay {self.delay}, device damping {self.device_damping:g} N s/m"
 
     @property
     def step(self) -> float:
@@ -93,13 +101,24 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
     """
     if law not in LAWS:
         raise ArgumentError("law", law, one_of(law, LAWS))
+    K, B, r = np.asarray(stiffness, float), np.asarray(damping, float), loop.resolution
     steps = round(loop.seconds * loop.rate)
-    x, v = np.full(len(stiffness), -loop.distance), np.full(len(stiffness), loop.speed)
-    positions, speeds, forces = (np.empty((steps, len(stiffness))) for _ in range(3))
-    wall = _Wall(loop, np.asarray(stiffness, float), np.asarray(damping, float), law, x)
+    x, v = np.full(len(K), -loop.distance), np.full(len(K), loop.speed)
+    first = np.round(x / r) * r if r > 0.0 else x.copy()
+    readings = [first - loop.speed * loop.step, *[first] * (loop.delay + 1)]  # those that are delayed, oldest first
+    commands = [np.zeros(len(K)) for _ in range(loop.delay)]
+    positions, speeds, forces = (np.empty((steps, len(K))) for _ in range(3))
     free, moved, held = _held_force(loop)
     for k in range(steps):
-        force = wall.answer(x)
+        readings = [*readings[1:], np.round(x / r) * r if r > 0.0 else x.copy()]
+        before, now = readings[:2]
+        rate = (now - before) / loop.step
+        command = np.where(now > 0.0, np.maximum(K * now + B * rate, 0.0), 0.0)
+        if law == IMPULSES:
+            blow = (1.0 + loop.restitution) * loop.mass * np.maximum(rate, 0.0) / loop.step
+            command = np.where((now > 0.0) & (before <= 0.0), blow, command)
+        commands.append(command)
+        force = commands.pop(0)
         acceleration = (loop.push - force) / loop.mass
         x, v = x + moved * v + held * acceleration, free * v + moved * acceleration
         diverged = ~(np.abs(x) < 1e3)  # metres: the motion diverges and would overflow
@@ -117,33 +136,6 @@ def _held_force(loop: Loop) -> tuple[float, float, float]:
     return float(np.exp(-c)), float(phi), float((T - phi) * T / c)
 
 
-class _Wall:
-    """The sampled side: sensor, delays, law. It stores the readings and commands that are delayed."""
-
-    def __init__(self, loop: Loop, stiffness: Floats, damping: Floats, law: str, start: Floats) -> None:
-        self.loop, self.K, self.B, self.law = loop, stiffness, damping, law
-        first = self._sense(start)
-        self.readings = [first - loop.speed * loop.step, *[first] * (loop.delay + 1)]
-        self.commands = [np.zeros_like(start) for _ in range(loop.delay)]
-
-    def _sense(self, x: Floats) -> Floats:
-        r = self.loop.resolution
-        return np.round(x / r) * r if r > 0.0 else x.copy()
-
-    def answer(self, x: Floats) -> Floats:
-        """Return the actuator's force from this sample to the next."""
-        self.readings = [*self.readings[1:], self._sense(x)]
-        before, now = self.readings[0], self.readings[1]
-        rate = (now - before) / self.loop.step
-        force = np.where(now > 0.0, np.maximum(self.K * now + self.B * rate, 0.0), 0.0)
-        if self.law == IMPULSES:
-            new = (now > 0.0) & (before <= 0.0)
-            blow = (1.0 + self.loop.restitution) * self.loop.mass * np.maximum(rate, 0.0) / self.loop.step
-            force = np.where(new, blow, force)
-        self.commands.append(force)
-        return self.commands.pop(0)
-
-
 def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> Contact:
     steps, count = positions.shape
     time = loop.step * np.arange(1, steps + 1)
@@ -155,8 +147,72 @@ def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> C
     late = time > time[first][None].min() + 1.0
     grown = (np.abs(speeds[late]) > GROWN * loop.speed).any(axis=0)
     left = (inside[:-1] & ~inside[1:]).sum(axis=0)
-    pressed = (forces > 0.0).argmax(axis=0)
     columns: Any = np.arange(count)
-    hardness = forces[pressed, columns] / loop.step / loop.speed
+    hardness = forces[(forces > 0.0).argmax(axis=0), columns] / loop.step / loop.speed
     return Contact(settled & ~grown, np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf), grown,
                    left.astype(np.int64), positions.max(axis=0, initial=0.0), hardness, forces.max(axis=0))
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """Outcomes of a grid of walls for one loop and one law.
+
+    stiffness : (k,) [N/m]; damping : (m,) [N s/m], 0 first
+    contact : outcomes; each array has shape (m k,), and the stiffness varies fastest
+    """
+
+    loop: Loop
+    law: str
+    stiffness: Floats
+    damping: Floats
+    contact: Contact
+
+    @property
+    def outcomes(self) -> tuple[str, ...]:
+        """SETTLES, BOUNCES_ON or GROWS for each wall."""
+        return tuple(GROWS if grown else SETTLES if settled else BOUNCES_ON
+                     for settled, grown in zip(self.contact.settled, self.contact.grown, strict=True))
+
+    @property
+    def passive(self) -> NDArray[np.bool_]:
+        """Whether each wall (m k,) satisfies the condition b >= KT/2 + |B|."""
+        K, B = walls(self.stiffness, self.damping)
+        return np.asarray(self.loop.passive_damping(K) >= B)
+
+    def at(self, damping: float) -> slice:
+        """Return the places of the walls with one of the dampings."""
+        row, size = int(np.flatnonzero(self.damping == damping)[0]), len(self.stiffness)
+        return slice(row * size, (row + 1) * size)
+
+    def settling(self, damping: float) -> Floats:
+        """Settling times (k,) at one of the dampings [s]."""
+        return np.where(self.contact.settled, self.contact.settling_time, np.inf)[self.at(damping)]
+
+
+def walls(stiffness: Floats, damping: Floats) -> tuple[Floats, Floats]:
+    """Return stiffness and damping of all pairs, each (m k,); the stiffness varies fastest."""
+    B, K = np.meshgrid(damping, stiffness, indexing="ij")
+    return K.ravel(), B.ravel()
+
+
+def loops() -> tuple[Loop, ...]:
+    """Return the loops: 512 Hz and 1 kHz, ideal and delayed sensors, with and without physical damping.
+
+    The paper's device has no physical damping.
+    """
+    kinds = [(rate, sensors, b) for rate in (512.0, 1000.0) for sensors in ((0, 0.0), LATE) for b in (0.0, 5.0)]
+    return tuple(Loop(rate=rate, device_damping=b, delay=delay, resolution=r) for rate, (delay, r), b in kinds)
+
+
+def grid(depth: str) -> tuple[Floats, Floats]:
+    """Return stiffnesses of 0.1 to 1000 kN/m, and dampings of 0 and 1 to 3000 N s/m, including the paper's 50."""
+    stiffnesses, dampings = GRIDS[depth]
+    damping = np.concatenate([[0.0], np.geomspace(1.0, 3e3, dampings - 2), [PAPER_DAMPING]])
+    return np.geomspace(1e2, 1e6, stiffnesses), np.sort(damping)
+
+
+def maps_of(loop: Loop, stiffness: Floats, damping: Floats) -> tuple[StabilityMap, StabilityMap]:
+    """Return the maps of a loop with penalties and with impulses, on the same walls."""
+    K, B = walls(stiffness, damping)
+    penalty, impulses = (StabilityMap(loop, law, stiffness, damping, touch_walls(loop, K, B, law)) for law in LAWS)
+    return penalty, impulses

@@ -1,0 +1,200 @@
+"""Textbook resolvers whose contacts only push, and resolvers with one planted bug each, by the law that detects it.
+
+The report shows one fault per law (`verification.laws.planted`); these are the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from reference.complementarity import ImpactProblem, solve
+from reference.exact import exact_impact
+from verification.impacts import Floats
+from verification.laws.resolver import (
+    RANK_CUT,
+    Resolver,
+    back,
+    least_push,
+    projecting,
+    sound_resolver,
+    whitened,
+)
+from verification.methods import gram_pinv
+
+TOO_MUCH = Fraction(10001, 10000)  # factor on the impulse that e requires
+Impulses = tuple[Floats, Floats]
+
+
+def reversed_velocity(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Keeps energy and restitution but ignores the contacts."""
+    return -e * v
+
+
+def pulling_clipped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Sets each pulling impulse to zero separately."""
+    parts = whitened(M, J, v)
+    p = -(1.0 + e) * (np.linalg.pinv(parts.rows.T, rcond=RANK_CUT) @ parts.u)
+    return back(parts, parts.u + parts.rows.T @ np.maximum(p, 0.0))
+
+
+def damped_formula(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Uses (W + λI)⁻¹ with a λ far above rounding."""
+    X = np.linalg.solve(M, J.T)
+    W = J @ X
+    return v - (1.0 + e) * (X @ np.linalg.solve(W + 1e-3 * np.eye(len(W)), J @ v))
+
+
+def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Gives 1e-4 more of the impulse than e requires; rationals, rounded once, give the same bits under every BLAS."""
+    before = [Fraction(x) for x in v.tolist()]
+    exact = exact_impact(M, J, v, e).velocity
+    return np.array([float(a + TOO_MUCH * (b - a)) for a, b in zip(before, exact, strict=True)])
+
+
+def gives_up(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    raise RuntimeError("did not converge")
+
+
+def makes_stale_jacobian() -> Resolver:
+    """Returns a resolver that reuses the Jacobian of the first call with each shape."""
+    remembered: dict[tuple[int, ...], Floats] = {}
+    return lambda M, J, v, e: sound_resolver(M, remembered.setdefault(J.shape, J), v, e)
+
+
+# name -> the law that must detect it, and how to make it
+BUGS: dict[str, tuple[str, Callable[[], Resolver]]] = {
+    "lost one plus": ("restitution", lambda: lambda M, J, v, e: projecting(M, J, v, e)),
+    "missing half": ("restitution", lambda: lambda M, J, v, e: projecting(M, J, v, 0.5 * (1.0 + e))),
+    "too loose rank": ("restitution", lambda: lambda M, J, v, e: projecting(M, J, v, 1.0 + e, cut=1e-2)),
+    "forgotten mass": ("kinetic_energy", lambda: lambda M, J, v, e: projecting(np.eye(len(v)), J, v, 1.0 + e)),
+    "reversed velocity": ("impulse_range", lambda: reversed_velocity),
+    "drops separating rows": ("restitution", lambda: lambda M, J, v, e: sound_resolver(M, J[J @ v < 0.0], v, e)),
+    "pulling clipped": ("restitution", lambda: pulling_clipped),
+    "printed formula": ("kinetic_energy", lambda: gram_pinv),
+    "single precision": ("restitution", lambda: lambda *given: sound_resolver(*given).astype(np.float32).astype(float)),
+    "damped formula": ("restitution", lambda: damped_formula),
+    "fails without contacts": ("kinetic_energy",
+                               lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J))),
+    "NaN without contacts": ("kinetic_energy",
+                             lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) if len(J) else v + np.nan),
+    "column of velocities": ("kinetic_energy", lambda: lambda *given: sound_resolver(*given)[:, None]),
+    "gives up": ("kinetic_energy", lambda: gives_up),
+    "stale Jacobian": ("restitution", makes_stale_jacobian),
+    "returns too much": ("kinetic_energy", lambda: returns_too_much),
+}
+
+
+# Contacts that only push.
+def _pushing(M: Floats, J: Floats, v: Floats, factor: float) -> Floats:
+    parts = whitened(M, J, v)
+    return back(parts, parts.u + factor * (parts.rows.T @ least_push(parts.rows, -parts.u)))
+
+
+def newton(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Newton's law 0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Moreau 1988), where p/(1 + e) = q minimizes |u + Aᵀq|."""
+    return _pushing(M, J, v, 1.0 + e)
+
+
+def poisson(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Poisson's law 0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0 (Anitescu and Potra 1997)."""
+    return _pushing(M, J, newton(M, J, v, e), 1.0)
+
+
+def _adhesive(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Also stops contacts that separate."""
+    return sound_resolver(M, J[J @ newton(M, J, v, e) > 0.0], newton(M, J, v, e), 0.0)
+
+
+def _one_sweep(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Resolves each contact once, in order, so later contacts undo earlier ones."""
+    for row in J:
+        v = newton(M, row[None], v, e)
+    return v
+
+
+# Friction: Moreau's law. The plastic impact obeys Coulomb's law; e scales its whole impulse by 1 + e. This is passive.
+def _plastic(M: Floats, J: Floats, T: Floats, v: Floats, mu: Floats, e: float = 0.0) -> Impulses:
+    """Normal and tangential impulses (c,), (c, m) of Coulomb's law with Newton's e, by sweeps over the contacts."""
+    c, m = len(J), T.shape[1]
+    if not c:
+        return np.zeros(0), np.zeros((0, m))
+    rows = np.concatenate([J[:, None], T], axis=1).reshape(-1, len(v))
+    problem = ImpactProblem.from_impact(M, rows, v, e, mu, contact_size=1 + m)
+    p = solve(problem, "nsgs").answer().reshape(c, 1 + m)
+    return p[:, 0], p[:, 1:]
+
+
+def _struck(M: Floats, J: Floats, T: Floats, v: Floats, p: Floats, p_t: Floats) -> Floats:
+    return v + np.linalg.solve(M, J.T @ p + np.einsum("cm,cmd->d", p_t, T))
+
+
+def moreau(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    """Moreau (1988): (v⁺ + e v⁻)/(1 + e) obeys Coulomb's law with e = 0; passive for every e in [0, 1]."""
+    p, p_t = _plastic(M, J, T, v, mu)
+    return _struck(M, J, T, v, (1.0 + e) * p, (1.0 + e) * p_t)
+
+
+def _newton_and_coulomb(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    """Newton's e on the normals and Coulomb's friction: may gain energy (Kane and Levinson 1985)."""
+    return _struck(M, J, T, v, *_plastic(M, J, T, v, mu, e))
+
+
+def _friction_pushes(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    """Friction pushes in the direction of sliding, not against it."""
+    p, p_t = _plastic(M, J, T, v, mu)
+    return _struck(M, J, T, v, (1.0 + e) * p, -(1.0 + e) * p_t)
+
+
+def no_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    return moreau(M, J, T, v, e, 0.0 * mu)
+
+
+def _strikes_what_separates(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    """The convex relaxation (Anitescu and Tasora 2010) at e = 0: a sliding contact separates with velocity μ|v_t|."""
+    if not len(J):
+        return v
+    rows = np.concatenate([J[:, None], T], axis=1).reshape(-1, len(v))
+    problem = ImpactProblem.from_impact(M, rows, v, 0.0, mu, contact_size=1 + T.shape[1], relaxed=True)
+    return v + (1.0 + e) * (solve(problem, "nsgs").velocity_plus - v)
+
+
+def _weak_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    """Halves the friction of sliding contacts: this stays inside the cone and is passive, but breaks Coulomb's law."""
+    p, p_t = _plastic(M, J, T, v, mu)
+    share = np.where(np.linalg.norm(p_t, axis=1) < mu * p * (1.0 - 1e-9), 1.0, 0.5)
+    return _struck(M, J, T, v, (1.0 + e) * p, (1.0 + e) * share[:, None] * p_t)
+
+
+def friction_of_one_alone(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+    """Drops friction if there is more than one contact."""
+    return moreau(M, J, T, v, e, mu if len(J) == 1 else 0.0 * mu)
+
+
+SOUND = {"unilateral": (newton, poisson), "frictional": (moreau,)}
+# contract and name -> the law that must detect it, and the resolver
+PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
+    ("unilateral", "wrong sign"): ("kinetic_energy", lambda M, J, v, e: _pushing(M, J, v, -(1.0 + e))),
+    ("unilateral", "forgotten mass"): ("kinetic_energy", lambda M, J, v, e: newton(np.eye(len(v)), J, v, e)),
+    ("unilateral", "pulls"): ("pushing", sound_resolver),
+    ("unilateral", "adhesive"): ("separating", _adhesive),
+    ("unilateral", "squared restitution"): ("restitution", lambda M, J, v, e: newton(M, J, v, e * e)),
+    # contacts separate too fast, but no inequality is broken and energy need not rise
+    ("unilateral", "too bouncy"): ("complementarity", lambda M, J, v, e: newton(M, J, v, float(np.sqrt(e)))),
+    ("unilateral", "one sweep"): ("no_penetration", _one_sweep),
+    ("unilateral", "plastic where some separate"):
+        ("mixed_restitution", lambda M, J, v, e: newton(M, J, v, 0.0 if np.any(J @ v > 0.0) else e)),
+    ("unilateral", "slow contacts ignored"): ("restitution", lambda M, J, v, e: newton(M, J[J @ v < -0.01], v, e)),
+    ("frictional", "Newton and Coulomb"): ("kinetic_energy", _newton_and_coulomb),
+    ("frictional", "friction pushes"): ("friction_opposes", _friction_pushes),
+    ("frictional", "twice the friction"): ("cone", lambda M, J, T, v, e, mu: moreau(M, J, T, v, e, 2.0 * mu)),
+    ("frictional", "no friction"): ("sticking", no_friction),
+    ("frictional", "squared restitution"): ("restitution", lambda M, J, T, v, e, mu: moreau(M, J, T, v, e * e, mu)),
+    ("frictional", "pulls"): ("cone", lambda M, J, T, v, e, mu: sound_resolver(M, J, v, e)),
+    ("frictional", "strikes what separates"): ("separating", _strikes_what_separates),
+    ("frictional", "weak friction"): ("maximal_dissipation", _weak_friction),
+    ("frictional", "friction of one alone"): ("maximal_dissipation", friction_of_one_alone),
+}

@@ -1,0 +1,327 @@
+"""Engines on the fixed scenes: energy, momentum and overlap, with each engine's own settings and with one step for all.
+
+All engines are measured in the same way, from the positions and velocities of their trajectories alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby, product
+from typing import Any
+
+import numpy as np
+
+from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from reference.simulators import (
+    FIXED_SCENES,
+    SIMULATORS,
+    FixedScene,
+    Simulator,
+    Trajectory,
+    find_simulator,
+    fixed_scene,
+)
+from reference.simulators.trajectory import deepest_overlap
+from verification.check import Check, Study, Topic
+from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, attempt
+from verification.table import Row, Table
+
+OWN, MATCHED = SETTINGS = ("own", "matched")
+MATCHED_STEP = 1e-3  # [s] the haptic rate
+# Duration of a resting scene at depth "quick" [s]; a full minute at 1 ms takes some engines a minute.
+QUICK_REST, QUICK_STACK = 1.0, 0.25
+OUR_OWN = ("iapb", "rigid")  # simulators of this project: their exceptions are faults of this project
+
+# An engine with springs as contacts cannot be exact. A hundredth of the initial energy, momentum and speed is an error
+# that a user would not notice, and far above rounding.
+CLOSE = 1e-2
+STAYS = 1e-3  # [m] a hundredth of the bodies' size
+NEVER_RISES = 1e-6  # relative rise of energy: above the rounding of 60 000 steps
+MET, MISSED, FAILED, MISSING = "met", "missed", "failed", "not installed"
+
+
+@dataclass(frozen=True)
+class EngineRecord:
+    """Results of one engine on one scene. A number is None if it does not apply or if there is no trajectory.
+
+    engine, title, version : name of the adapter, name of the engine, and its version ("" if it is not installed)
+    scene : name of the scene; rests : whether all bodies must stay at rest in this scene
+    choice : "own" or "matched"; settings : step and options in words; note : features that the engine lacks
+    step, duration : time step, simulated time [s]
+    energy_error : (kinetic energy at the end − true) / kinetic energy at the start; impact scenes
+    energy_gain : largest rise of kinetic plus potential energy above its start value, divided by the kinetic energy at
+    the start; in resting scenes divided by the work of gravity along the scene's length
+    momentum_error : |momentum at the end − true| / sum of m |v| at the start; impact scenes
+    velocity_error : largest error of a body's final velocity / largest speed at the start; impact scenes
+    penetration : deepest overlap [m], by our measure; most_contacts : largest number of contacts, as the engine counts
+    drift : largest distance of a body from its start [m]; creep : drift in the second half; resting scenes
+    failure : reason why there are no numbers; missing : how to install the engine
+    """
+
+    engine: str
+    title: str
+    version: str
+    scene: str
+    rests: bool
+    choice: str
+    settings: str = ""
+    note: str = ""
+    step: float | None = None
+    duration: float = 0.0
+    energy_error: float | None = None
+    energy_gain: float | None = None
+    momentum_error: float | None = None
+    velocity_error: float | None = None
+    penetration: float | None = None
+    most_contacts: int | None = None
+    drift: float | None = None
+    creep: float | None = None
+    failure: str = ""
+    missing: str = ""
+
+
+def compare_engines(
+    engines: Sequence[str] | None = None,
+    scenes: Sequence[str] | None = None,
+    depth: str = "full",
+    progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
+) -> list[EngineRecord]:
+    """Run every engine on every scene at both choices of settings.
+
+    Parameters
+    ----------
+    engines, scenes : names; by default all. An engine that is not installed gets records that say so.
+    depth : "full", or "quick" with shorter resting scenes
+    failures : receives exceptions outside of the other engines; an exception of another engine in a run is a result
+
+    If an engine's own settings equal the matched ones, one run gives both records.
+    """
+    if depth not in ("quick", "full"):
+        raise ArgumentError("depth", depth, "quick or full")
+    pairs, records = list(product(engines or SIMULATORS, scenes or FIXED_SCENES)), list[EngineRecord]()
+    for done, (name, scene) in enumerate(pairs, 1):
+        records += attempt(f"{name} on {scene}", partial(_both, name, scene, depth), failures) or []
+        if progress is not None:
+            progress(done, len(pairs))
+    return records
+
+
+def _both(name: str, scene_name: str, depth: str) -> list[EngineRecord]:
+    simulator, scene = find_simulator(name), fixed_scene(scene_name)
+    blank = EngineRecord(name, simulator.title, "", scene_name, scene.rests, OWN)
+    try:
+        blank = replace(blank, version=simulator.version())
+    except MissingDependencyError as error:
+        return [replace(blank, choice=choice, missing=str(error)) for choice in SETTINGS]
+    duration = scene.duration
+    if depth == "quick" and scene.rests:
+        duration = min(duration, QUICK_STACK if len(scene.bodies) > 1 else QUICK_REST)
+    own, matched = simulator.settings(scene), simulator.settings(scene, MATCHED_STEP)
+    records: list[EngineRecord] = []
+    for choice, settings in ((OWN, own), (MATCHED, matched)):
+        if records and settings == own:
+            records.append(replace(records[0], choice=choice))
+            continue
+        head = replace(blank, choice=choice, settings=str(settings), note=settings.note, step=settings.step,
+                       duration=duration)
+        records.append(replace(head, **_outcome(name, simulator, scene, settings, duration)))
+    return records
+
+
+def _outcome(name: str, simulator: Simulator, scene: Any, settings: Any, duration: float) -> dict[str, Any]:
+    """Return the measures of a run, or the failure that stopped it; engines raise exceptions of any type.
+
+    An exception of our own engines propagates, and the case counts as failed.
+    """
+    try:
+        return measured(scene, simulator.run(scene, settings, settings.step, duration))
+    except Exception as error:
+        if name in OUR_OWN:
+            raise
+        said = str(error) if isinstance(error, IapbError) else f"{type(error).__name__}: {' '.join(str(error).split())}"
+        return {"failure": said[:160]}
+
+
+def measured(scene: FixedScene, motion: Trajectory) -> dict[str, Any]:
+    """Return the measures of an `EngineRecord`; if a number is not finite, return only a failure."""
+    if not motion.finite:
+        first = int(np.argmin(np.isfinite(motion.velocity).all(axis=(1, 2))))
+        return {"failure": f"not a number from {motion.time[first]:.4g} s on"}
+    kinetic, masses, most = motion.kinetic_energy(scene), scene.masses, int(motion.contacts.max())
+    energy = kinetic + motion.potential_energy(scene)
+    scale = float(masses.sum() * np.linalg.norm(scene.gravity) * scene.length) if scene.rests else kinetic[0]
+    common = {"penetration": max(0.0, deepest_overlap(scene, motion)), "most_contacts": most if most >= 0 else None,
+              "energy_gain": float((energy.max() - energy[0]) / scale)}
+    if scene.rests:
+        places, half = motion.position, motion.position[len(motion.position) // 2]
+        return common | {"drift": float(np.linalg.norm(places - places[0], axis=-1).max()),
+                         "creep": float(np.linalg.norm(places - half, axis=-1).max())}
+    truth = np.array(scene.final_velocities)
+    true_energy = 0.5 * float(masses @ (truth**2).sum(axis=1))
+    speeds, off = np.linalg.norm(motion.velocity[0], axis=1), motion.velocity[-1] - truth
+    return common | {
+        "energy_error": float((kinetic[-1] - true_energy) / kinetic[0]),
+        "momentum_error": float(np.linalg.norm(masses @ off) / (masses @ speeds)),
+        "velocity_error": float(np.linalg.norm(off, axis=1).max() / scene.fastest),
+    }
+
+
+def verdict(record: EngineRecord) -> str:
+    """Return one of MET, MISSED, FAILED and MISSING."""
+    if record.missing:
+        return MISSING
+    if record.failure:
+        return FAILED
+    if record.rests:
+        return MET if (record.drift or 0.0) <= STAYS else MISSED
+    errors = (record.energy_error, record.momentum_error, record.velocity_error)
+    return MET if all(abs(error or 0.0) <= CLOSE for error in errors) else MISSED
+
+
+def sentence(records: Sequence[EngineRecord]) -> str:
+    """Return the results of one engine at one choice of settings in one sentence."""
+    first = records[0]
+    if first.missing:
+        return f"{first.title} is not installed here: {first.missing}"
+    met = [record for record in records if verdict(record) == MET]
+    at = "with its own settings" if first.choice == OWN else f"with a step of {1e3 * (first.step or 0.0):g} ms"
+    parts = [f"{first.title} {first.version}, {at}, gives the known outcome in {len(met)} of {len(records)} scenes"]
+    missed = [f"{record.scene.replace('_', ' ')} ({_worst(record)})" for record in records if record not in met]
+    if missed:
+        parts.append("it misses it in " + ", ".join(missed))
+    gains = [record for record in records if (record.energy_gain or 0.0) > NEVER_RISES]
+    if gains:
+        most = max(gains, key=lambda record: record.energy_gain or 0.0)
+        parts.append(f"energy rises in {len(gains)} scene{'s' * (len(gains) > 1)}, with a relative rise of at most "
+                     f"{most.energy_gain:.2g} ({most.scene.replace('_', ' ')})")
+    else:
+        parts.append("energy rises in no scene")
+    return "; ".join(parts) + "."
+
+
+def _worst(record: EngineRecord) -> str:
+    """Return the measure with the largest error in words, or the failure."""
+    if record.failure:
+        return "failed: " + record.failure.rstrip(".")
+    if record.rests:
+        return f"moves by {record.drift:.3g} m"
+    errors = {"energy": record.energy_error, "momentum": record.momentum_error, "velocity": record.velocity_error}
+    name, value = max(errors.items(), key=lambda item: abs(item[1] or 0.0))
+    return f"{name} off by {abs(value or 0.0):.2g}"
+
+
+# The topic of the report: a record is a row, whose numbers have other names.
+_NUMBERS = {"energy error": "energy_error", "largest rise of energy": "energy_gain", "momentum error": "momentum_error",
+            "velocity error": "velocity_error"}
+
+
+def row_of(record: EngineRecord) -> Row:
+    """Return the row of a record."""
+    depth = None if record.penetration is None else record.penetration / fixed_scene(record.scene).length
+    return {
+        "engine": record.title, "version": record.version, "scene": record.scene.replace("_", " "),
+        "settings": record.choice, "law": verdict(record),
+        **{key: getattr(record, name) for key, name in _NUMBERS.items()}, "overlap / size": depth,
+        "drift [m]": record.drift, "creep [m]": record.creep, "simulated [s]": record.duration or None,
+        "failure": record.failure,
+    }
+
+
+def _record(row: Row) -> EngineRecord:
+    """Return what the sentences need of a row."""
+    numbers = {name: row[key] for key, name in _NUMBERS.items()}
+    return EngineRecord(row["engine"], row["engine"], row["version"], row["scene"], row["drift"] is not None,
+                        row["settings"], step=MATCHED_STEP, drift=row["drift"], failure=row["failure"],
+                        missing=MISSING * (row["law"] == MISSING), **numbers)
+
+
+def _records(table: Table) -> list[EngineRecord]:
+    return [record for record in map(_record, table.records()) if not record.missing]
+
+
+def _rows(study: Study, case: tuple[str, str]) -> Iterator[Row]:
+    yield from map(row_of, study.once(case, lambda: _both(*case, study.depth)))
+
+
+def _settings(study: Study, name: str) -> Iterator[Row]:
+    """Yield a row per settings of an engine, with the scenes in which they were used."""
+    uses: dict[tuple[str, str, str, str], list[str]] = {}
+    for scene in FIXED_SCENES:
+        for one in study.results.get((name, scene), ()):
+            key = (one.title, one.version or MISSING, one.settings, one.note)
+            uses.setdefault(key, []).append(f"{one.scene.replace('_', ' ')} ({one.choice})")
+    for (title, version, settings, note), used in uses.items():
+        yield {"engine": title, "version": version, "settings": settings,
+               "used in": "" if version == MISSING else ", ".join(used), "what it cannot do": note}
+
+
+def _says(table: Table) -> Iterator[Part]:
+    """Yield one part per engine and choice of settings, and one on the engines that are not installed."""
+    present = _records(table)
+    ours = _misses(record for record in present if _is_ours(record))
+    said = False
+    for (title, choice) in dict.fromkeys((record.title, record.choice) for record in present):
+        group = [record for record in present if (record.title, record.choice) == (title, choice)]
+        met = _met(group) == len(group)
+        miss = "" if said or met or not _is_ours(group[0]) else "; ".join(
+            f"{scene} {', '.join(each)}" for scene, each in ours.items())  # one clause for both choices of settings
+        said = said or bool(miss)
+        yield Part(sentence(group), REPRODUCED if met else MIXED, miss=miss)
+    absent = sorted({row["engine"] for row in table.records() if row["law"] == MISSING})
+    if absent:
+        yield Part(f"Not installed, hence not compared: {', '.join(absent)}.", NOT_TESTABLE, optional=True)
+
+
+def _is_ours(record: EngineRecord) -> bool:
+    return record.title.endswith("(ours)")
+
+
+def _misses(records: Iterable[EngineRecord]) -> dict[str, list[str]]:
+    """Return the misses in words, by scene."""
+    missed: dict[str, list[str]] = {}
+    for one in records:
+        if verdict(one) != MET:
+            at = "at own settings" if one.choice == OWN else "at 1 ms"
+            missed.setdefault(one.scene.replace("_", " "), []).append(f"{_worst(one)} {at}")
+    return missed
+
+
+def _met(records: Sequence[EngineRecord]) -> int:
+    return sum(verdict(record) == MET for record in records)
+
+
+def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
+    present = _records(tables["errors"])
+    own, matched = ([record for record in present if record.choice == choice] for choice in SETTINGS)
+    ordered = sorted(present, key=lambda record: (not _is_ours(record), record.title))
+    every = {title: _misses(group) for title, group in groupby(ordered, key=lambda record: record.title)}
+    said = "; by ".join(f"{title}: " + ", ".join(f"{scene} {' and '.join(each)}" for scene, each in missed.items())
+                        for title, missed in every.items() if missed)
+    return (
+        f"{len({record.title for record in present})} engines on {len({record.scene for record in present})} scenes of "
+        f"known outcome: the outcome is right in {_met(own)} of {len(own)} runs with the engine's own settings and in "
+        f"{_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Missed by {said}." if said else "")
+    )
+
+
+ERRORS = Check(
+    key="errors", question="Does the engine give the known outcome?",
+    cases=lambda study: product(SIMULATORS, FIXED_SCENES), row=_rows, says=_says, digits=2,
+    note="Errors are relative to the kinetic energy at the start, to the sum of m |v| and to the largest speed; in "
+    "resting scenes the rise of energy is relative to m g times the bodies' size. Law met: all errors are at most 1 %, "
+    "or, in resting scenes, nothing moves by more than 1 mm.",
+)
+engines = Topic(
+    key="engines", title="Other engines",
+    question="Every installed engine simulates eight frictionless scenes of known outcome: conservation of energy and "
+    "momentum with symmetry determine the outcome, or nothing may move. Each scene runs twice: with the settings that "
+    "suit the engine best, and with a time step of 1 ms. One program computes energy, momentum and overlap from the "
+    "positions and velocities of all engines. MuJoCo and Drake have no coefficient of restitution; springs with "
+    "suitable damping replace it.",
+    checks=(ERRORS, Check(key="settings", question="With which settings did the engines run?",
+                          cases=lambda study: SIMULATORS, row=_settings)),
+    says=_answer,
+)

@@ -1,0 +1,247 @@
+"""Topics on the laws, and the smallest inputs that break a law.
+
+`properties` checks every law on random impacts, on the engine and along trajectories, each with a planted fault;
+`energy_gains` measures the energy gains of very many impacts. The kit finds and shrinks the counterexamples, or they
+are made by hand if that explains more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from iapb import resolve_impact
+from iapb.errors import IapbError
+from reference.exact import exact_impact, relative_energy_gain
+from verification.check import SEED, Check, Study, Topic
+from verification.finding import (
+    REFUTED,
+    REPRODUCED,
+    Failure,
+    Finding,
+    Part,
+    attempt,
+    counted,
+    of_each,
+    verdict_of_law,
+)
+from verification.impacts import ImpactCase
+from verification.laws import LAWS, PLANTED_BUGS, bulk_impacts, check_passivity
+from verification.laws.bounds import LawCount, relative_gain
+from verification.laws.engine import (
+    ENGINE_LAWS,
+    judge_engine_law,
+    limited_impulses_are_passive,
+    saturated,
+    saturation_counterexample,
+    scaled,
+)
+from verification.laws.planted import (
+    PLANTED_ENGINE_FAULTS,
+    PLANTED_TRAJECTORY_FAULTS,
+    each_contact_its_own_restitution,
+    first_occasion,
+)
+from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
+from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
+from verification.methods import gram_pinv
+from verification.table import HOLDS, Row, Table
+
+IMPACTS = {"quick": 100_000, "full": 1_000_000}
+COMPARED_IMPACTS = {"quick": 10_000, "full": 100_000}  # impacts of the compared variants
+KIT_IMPACTS, FAULT_IMPACTS = 1500, 400
+ENGINE_CASES, SIMULATED, FAULT_CASES = 300, 20, 60  # cases per law, per simulating law, with a fault
+TRAJECTORIES, IN_SPACE, TRAJECTORY_STEPS = 60, 40, 300
+COUNTER_IMPACTS, SEARCH = 500, 300  # for the search of a counterexample
+_CAUGHT = "fault caught"
+Progress = Callable[[int, int], None]
+
+
+def _row(law: str, count: LawCount, fault: str, caught: bool) -> Row:
+    """Return the row of a law; the worst is empty if the law applied to no case."""
+    value, bound = (count.worst.value, count.worst.tolerance) if count.worst else (None, None)
+    return {"law": law, "cases": count.checked, "worst": value, "bound": bound, HOLDS: not count.failures,
+            "fault": fault.replace("_", " "), _CAUGHT: caught}
+
+
+def _impact_law(study: Study, name: str) -> Row:
+    report = study.once("kit", lambda: check_passivity(resolve_impact, impacts=KIT_IMPACTS, search=0))
+    verdict, fault = report.verdict(name), PLANTED_BUGS[name]
+    if verdict.error is not None:
+        raise verdict.error
+    broken = check_passivity(fault.make(), impacts=FAULT_IMPACTS, search=0)
+    return _row(verdict.statement, verdict, fault.name, name in broken.broken_laws)
+
+
+def _engine_law(study: Study, name: str) -> Row:
+    cases = SIMULATED if name in ("group_splitting", "device_port") else ENGINE_CASES
+    count, fault = judge_engine_law(name, cases=cases, seed=SEED)[0], PLANTED_ENGINE_FAULTS[name]
+    with np.errstate(all="ignore"):  # the faulty subjects may overflow
+        broken = judge_engine_law(name, fault.make(), cases=min(cases, FAULT_CASES), seed=SEED)[0]
+    return _row(ENGINE_LAWS[name].statement, count, fault.name, broken.failures > 0)
+
+
+class _Trajectories(NamedTuple):
+    scenes: list[SceneCase]
+    every: list[Trajectory]
+    whole: list[Trajectory]  # without those that do not stay finite
+
+
+def _trajectories(study: Study) -> _Trajectories:
+    rng = np.random.default_rng(SEED)
+    scenes = [draw_scene(rng, TRAJECTORY_STEPS) for _ in range(TRAJECTORIES)]
+    scenes += [draw_spatial_scene(rng, TRAJECTORY_STEPS) for _ in range(IN_SPACE)]
+    runs = of_each(enumerate(scenes, 1), lambda case: [Trajectory(case[1].simulate())], study.failures,
+                   lambda case: f"trajectory of random scene {case[0]}")
+    every, finite = list(runs), TRAJECTORY_LAWS["finite"]
+    sound = attempt("finite", lambda: [(one, finite.check(one)) for one in every], []) or ()
+    return _Trajectories(scenes, every, [one for one, found in sound if found is None or found.passed] or every)
+
+
+def _trajectory_law(study: Study, name: str) -> Row:
+    drawn = study.once("trajectories", lambda: _trajectories(study))
+    law, count = TRAJECTORY_LAWS[name], LawCount(name)
+    for one in drawn.every if name == "finite" else drawn.whole:
+        found = law.check(one)
+        if found is not None:
+            count.add(found)
+    run = first_occasion(name, drawn.scenes)
+    residual = law.check(Trajectory(run)) if run is not None else None
+    caught = residual is not None and not residual.passed
+    return _row(f"along a trajectory: {law.statement}", count, PLANTED_TRAJECTORY_FAULTS[name].__name__, caught)
+
+
+KINDS: dict[str, Callable[[Study, str], Row]] = {
+    "impact": _impact_law, "engine": _engine_law, "trajectory": _trajectory_law}
+
+
+def _laws(study: Study) -> Iterator[tuple[str, str]]:
+    yield from (("impact", name) for name in LAWS)
+    yield from (("engine", name) for name in ENGINE_LAWS)
+    yield from (("trajectory", name) for name in TRAJECTORY_LAWS)
+
+
+def _laws_say(table: Table) -> Iterator[Part]:
+    caught = table.column(_CAUGHT)
+    yield Part(f"{sum(table.decided)} of {len(table.rows)} laws hold on random and adverse inputs.",
+               verdict_of_law(table.holds))
+    yield Part(f"{sum(caught)} of {len(caught)} planted faults are caught.", verdict_of_law(caught))
+
+
+properties = Topic(
+    key="properties", title="Properties",
+    question="Do the laws hold on every input, and does each check detect a planted fault?",
+    checks=(Check(  # the worst of random cases depends on rounding, so it is printed but not compared
+        key="laws", question="Does the law hold, and is its planted fault caught?", cases=_laws,
+        row=lambda study, case: KINDS[case[0]](study, case[1]), says=_laws_say, prose=["worst"]),),
+    says=lambda tables, parts: f"{parts[0].sentence[:-1]}; {parts[1].sentence}",
+)
+
+
+# method, clamp, number of impacts
+METHODS: dict[str, tuple[str, bool | None, dict[str, int]]] = {
+    "factored": ("factored", None, IMPACTS), "factored, no clamp": ("factored", False, COMPARED_IMPACTS),
+    "gram_pinv, as printed": ("gram_pinv", None, COMPARED_IMPACTS),
+}
+_GAIN, _SHARE, _ABOVE = "largest relative energy gain", "gain / (10 d ε √κ)", "above 10 d ε √κ"
+_BULK = ("condition of M from", "impacts", _GAIN, _SHARE, "gain / (d ε κ)", _ABOVE, "largest restitution residual")
+
+
+def _gains(study: Study, name: str) -> Iterator[Row]:
+    method, clamp, impacts = METHODS[name]
+    for row in bulk_impacts(impacts[study.depth], SEED, method, clamp).by_condition():
+        yield {"method": name, **dict(zip(_BULK, row, strict=True))}
+
+
+def _gains_say(table: Table) -> Iterator[Part]:
+    totals = {row["method"]: row for row in table.where(**{"condition of M from": "all"}).records()}
+    ours, printed = totals.get("factored"), totals.get("gram_pinv, as printed")
+    if ours and printed:
+        most = " gains no energy" if ours[_GAIN] <= 0.0 else \
+            f"'s largest relative energy gain is {ours[_GAIN]:.1e}, {ours[_SHARE]:.2g} of its bound 10 d ε √κ(M)"
+        yield Part(f"In {ours['impacts']:,} random impacts the engine{most}; the printed formula gains up to "
+                   f"{printed[_GAIN]:.1e}.", REPRODUCED if ours[_ABOVE] == 0 else REFUTED)
+
+
+energy_gains = Topic(
+    key="energy-gains", title="Passive in floating point", question="Does rounding make energy?",
+    checks=(Check(
+        key="impacts", question="How much energy do random impacts gain, with and without the clamp, and as printed?",
+        cases=lambda study: METHODS, row=_gains, says=_gains_say, digits=3,
+        note="d 1 to 30, c 0 to 100, rank deficient, e in [−1, 1]; velocities N(0, I) in v and in Lᵀv; energies in "
+        "double-double."),),
+    says=lambda tables, parts: " ".join(part.sentence for part in parts),
+)
+
+
+def counterexamples(progress: Progress, failures: list[Failure]) -> tuple[Finding, ...]:
+    """Return inputs that break a law: for the printed formula, for one restitution per contact, and for saturation."""
+    makers = (printed_formula, restitution_per_contact, saturation)
+    return tuple(of_each(counted(makers, progress), lambda make: [make()], failures,
+                         lambda make: make.__name__.replace("_", " ")))
+
+
+def printed_formula() -> Finding:
+    """Return the kit's counterexample to equations (20)-(21) as printed (`gram_pinv`), checked in exact rationals."""
+    report = check_passivity(gram_pinv, impacts=COUNTER_IMPACTS, search=SEARCH)
+    verdict, case = report.verdict("kinetic_energy"), report.counterexample
+    if case is None or report.counterexample_law != "kinetic_energy":
+        raise IapbError(f"in {COUNTER_IMPACTS} random impacts and the adverse ones the printed formula gains no energy")
+    answer, gain = _struck(gram_pinv, case, relative_energy_gain)
+    exact = exact_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).rounded_velocity
+    sentence = (
+        f"The formula as printed gains {gain:.2g} of the kinetic energy, in exact rationals, on {case.contacts} rows "
+        f"of {case.coordinates} coordinates with e = {case.restitution:g}. The passivity kit found and shrank this "
+        f"case by itself; {verdict.failures} of its {verdict.checked} impacts gained energy, at most "
+        f"{verdict.largest:.2g} of it."
+    )
+    given = {**_arrays(case), "v⁺ as computed": answer, "v⁺ exact, rounded": exact}
+    return counterexample("gram_pinv", verdict.statement, sentence, given, report.counterexample_test)
+
+
+def restitution_per_contact() -> Finding:
+    """Return the counterexample to the obvious extension of (15): equalities with one restitution per row."""
+    resolver = each_contact_its_own_restitution
+    report = check_passivity(resolver, impacts=COUNTER_IMPACTS // 2, search=SEARCH, unequal_restitution=True)
+    verdict, case = report.verdict("unequal_kinetic_energy"), report.counterexample
+    if case is None:
+        raise IapbError("the kit found no impact in which restitution per contact gains energy")
+    answer, gain = _struck(resolver, case, relative_gain)
+    sentence = (
+        f"Equalities with one restitution per contact, J v⁺ = −E J v⁻, multiply the kinetic energy by "
+        f"{1.0 + gain:.3g}. The passivity kit found and shrank this case. Where restitutions differ, the engine uses "
+        "Poisson's law (two LCPs), which is passive."
+    )
+    return counterexample("J v⁺ = −E J v⁻", verdict.statement, sentence,
+                          {**_arrays(case), "v⁺ as computed": answer}, report.counterexample_test)
+
+
+def _struck(resolver: Any, case: Any, gain: Callable[..., float]) -> tuple[Any, float]:
+    answer = resolver(*case.given())
+    return answer, gain(case.mass_matrix, case.velocity, answer)
+
+
+def saturation() -> Finding:
+    """Return the counterexample to clipping an impulse component by component (section VI)."""
+    case = saturation_counterexample()
+    clipped, fitted = (limited_impulses_are_passive(case, subject) for subject in (saturated, scaled))
+    _, force = saturated(case.impulse, case.dt, case.force_limit)
+    sentence = (
+        f"A device that clips each component of an impulse by itself gains {clipped.value:.2%} of its kinetic energy, "
+        f"while the tool loses energy. With one factor for the whole impulse both lose {-fitted.value:.2%}."
+    )
+    given = {**_arrays(case.impact), "impulse [N s]": case.impulse, "force limit [N]": case.force_limit,
+             "impulse the device renders [N s]": case.dt * force}
+    return counterexample("saturate", "an impulse cut to the device's limits is passive", sentence, given)
+
+
+def counterexample(who: str, law: str, sentence: str, given: Mapping[str, Any], test: str = "") -> Finding:
+    """Return the Finding for a broken law, with the input and the answer by name and the source of a test, if any."""
+    details = {name: str(np.asarray(array).tolist()) for name, array in given.items()}
+    return Finding(who, who, law, sentence, REFUTED, details={**details, "test": test})
+
+
+def _arrays(case: ImpactCase) -> dict[str, Any]:
+    return {"M": case.mass_matrix, "J": case.contact_jacobian, "v⁻": case.velocity, "e": case.given_restitution()}

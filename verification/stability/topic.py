@@ -1,0 +1,137 @@
+"""Topic: the stability of sampled contact with penalties and impulses (C20, C21), and its rate-hardness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from verification.check import Check, Study, Topic
+from verification.finding import MIXED, REFUTED, REPRODUCED, Part
+from verification.stability.device_port import PORT
+from verification.stability.peg import PEG, PULSES
+from verification.stability.walls import (
+    BOUNCES_ON,
+    GRIDS,
+    GROWS,
+    LAWS,
+    PAPER_DAMPING,
+    SETTLES,
+    Loop,
+    StabilityMap,
+    grid,
+    loops,
+    maps_of,
+)
+from verification.table import Row, Table
+
+MARKS = {SETTLES: "+", BOUNCES_ON: "o", GROWS: "x"}
+
+
+def _maps(study: Study, loop: Loop) -> tuple[StabilityMap, StabilityMap]:
+    return study.once(loop, lambda: maps_of(loop, *grid(study.depth)))
+
+
+def _loop(loop: Loop) -> Row:
+    return {"rate [Hz]": loop.rate, "sensors": "late" if loop.delay else "ideal",
+            "device damping [N s/m]": loop.device_damping}
+
+
+def _marks(study: Study, loop: Loop) -> Iterator[Row]:
+    """Yield a row per stiffness, with one mark per damping for its outcome."""
+    both = _maps(study, loop)
+    for i, K in enumerate(both[0].stiffness):
+        marks = ["".join(MARKS[outcome] for outcome in one.outcomes[i :: len(one.stiffness)]) for one in both]
+        yield {**_loop(loop), "stiffness [N/m]": float(K),
+               "passive up to [N s/m]": max(float(loop.passive_damping(K)), 0.0),
+               "penalties": marks[0], "impulses": marks[1]}
+
+
+def _of_maps(table: Table) -> Iterator[Part]:
+    """Yield the parts on stable walls, on the condition b >= KT/2 + |B|, and on a device without damping."""
+    theirs, ours = (np.array([list(marks) for marks in table.column(law)]) for law in ("penalties", "impulses"))
+    yield _held(table, theirs == "+", ours == "+")
+    rate, b, K = (np.array(table.column(key)) for key in ("rate", "device damping", "stiffness"))
+    ideal = np.array(table.column("sensors")) == "ideal"
+    damping = next(grid(depth)[1] for depth in GRIDS if GRIDS[depth][1] == theirs.shape[1])
+    passive = (b - 0.5 * K * (1.0 / rate))[:, None] >= damping
+    damped, bare = ideal & (b > 0.0), ideal & (b == 0.0)
+    gains = int((passive & (theirs == "x"))[damped].sum())
+    yield Part(
+        f"Where b >= KT/2 + |B| holds, no wall may accelerate the hand: {gains} of {passive[damped].sum()} do. With "
+        f"this hand {(~passive & (theirs == '+'))[damped].sum()} walls outside the condition settle as well, because "
+        "the condition covers every hand.", REFUTED if gains else REPRODUCED)
+    shares = ", ".join(f"{100 * (theirs == '+')[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
+                       for one in dict.fromkeys(rate[bare].tolist()))
+    yield Part(
+        "The paper's device has no damping, b = 0. By the condition no wall is then passive for every hand. With this "
+        f"hand, a constant force, penalties are still stable on {shares} of these walls.", MIXED)
+
+
+def _held(table: Table, theirs: np.ndarray, ours: np.ndarray) -> Part:
+    loop = table.select(["rate", "sensors", "device damping"]).rows
+    groups = [[k for k, own in enumerate(loop) if own == one] for one in dict.fromkeys(loop)]
+    more = [ours[of].sum() / theirs[of].sum() for of in groups]
+    lost = int((theirs & ~ours).sum())
+    return Part(
+        f"Of {theirs.size} walls, {theirs.sum()} are stable with penalties and {ours.sum()} with impulses: "
+        f"{min(more):.2f} to {max(more):.2f} times as many, depending on the loop. {lost} walls are stable only "
+        "with penalties.",
+        REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
+        miss=f"{lost} of {theirs.size} walls are stable only without impulses" if lost else "")
+
+
+def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
+    """Yield a row per law and stiffness at the paper's damping."""
+    for one in _maps(study, loop):
+        contact, at = one.contact, one.at(PAPER_DAMPING)
+        columns = (contact.rate_hardness, contact.settling_time, contact.penetration, contact.bounces,
+                   contact.peak_force)
+        for K, *values in zip(one.stiffness, *(column[at] for column in columns), strict=True):
+            hardness, settling, depth, bounces, peak = map(float, values)
+            yield {**_loop(loop), "law": one.law, "stiffness [N/m]": float(K), "rate-hardness [N/m]": hardness,
+                   "settles after [s]": settling if math.isfinite(settling) else None, "penetration [mm]": 1e3 * depth,
+                   "bounces": int(bounces), "peak force [N]": peak}
+
+
+def _hard(table: Table) -> Part:
+    """Return the part on rate-hardness and penetration of impulses, relative to penalties."""
+    of_law = [table.where(law=law) for law in LAWS]
+    size = len(set(table.column("stiffness")))
+    harder, deeper = (
+        np.median(np.divide(*(np.array(one.column(key)) for one in of_law[::-1])).reshape(-1, size), axis=1)
+        for key in ("rate-hardness", "penetration")
+    )
+    return Part(
+        f"At the paper's wall damping of {PAPER_DAMPING:g} N s/m the rate-hardness with impulses is {min(harder):.3g} "
+        f"to {max(harder):.3g} times that with penalties (median over stiffnesses), and the penetration "
+        f"{min(deeper):.2f} to {max(deeper):.2f} times.",
+        REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)
+
+
+MAPS = Check(
+    key="maps", question="At which walls does the mass come to rest?", cases=lambda study: loops(), row=_marks,
+    says=_of_maps, digits=3, note="One mark per damping, from small to large: + the mass settles, o it keeps bouncing, "
+    "x its motion grows.",
+)
+DAMPINGS = Check(
+    key="dampings", question="Which dampings do the maps have?", cases=lambda study: grid(study.depth)[1],
+    row=lambda study, B: {"damping [N s/m]": float(B)},
+)
+HARDNESS = Check(
+    key="hardness", question="How hard does a wall feel?", cases=lambda study: loops(), row=_hardness, says=_hard,
+    digits=3, note="Wall damping 50 N s/m, as in the paper. Rate-hardness: the rise of the force per second over the "
+    "first step of contact, divided by the approach speed (Lawrence and others, 2000).",
+)
+
+contact_stability = Topic(
+    key="stability", title="Stability of contact",
+    question="A virtual wall in a sampled loop can feed energy to the hand. First, a constant force pushes a mass of 2 "
+    "kg against walls over a grid of stiffness and damping; the loop samples at 512 Hz or 1 kHz, and the motion "
+    "between samples is exact. Then the peg of Figure 4 runs in the engine's own loop. The dashed line is Colgate's "
+    "condition for passivity, b >= KT/2 + |B|, which is sufficient for any hand. A wall is stable if the mass comes to "
+    "rest.",
+    checks=(MAPS, DAMPINGS, HARDNESS, PEG, PULSES, PORT),
+    says=lambda tables, parts: parts[0].sentence if "maps" in tables else "",
+)
