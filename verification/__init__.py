@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from verification.hard_cases import judge_hard_cases as judge_hard_cases
     from verification.laws import bulk_impacts as bulk_impacts
     from verification.laws import check_passivity as check_passivity
-    from verification.worlds.comparison import compare_worlds as compare_worlds
+    from verification.worlds import compare_worlds as compare_worlds
 
 _HOME = {
     "check_passivity": "verification.laws",
@@ -23,7 +23,7 @@ _HOME = {
     "judge_hard_cases": "verification.hard_cases",
     "which_method": "verification.cost.impacts",
     "work_precision": "verification.cost.impacts",
-    "compare_worlds": "verification.worlds.comparison",
+    "compare_worlds": "verification.worlds",
 }
 
 __getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

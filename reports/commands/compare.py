@@ -28,7 +28,7 @@ from verification.complementarity.problems import FACTORS, ProblemStudy, own_pro
 from verification.complementarity.study import compare as study_all
 from verification.complementarity.tables import problems as problems_table
 from verification.finding import Failure, Finding, Table, finding_of, titled
-from verification.worlds.comparison import compare_worlds
+from verification.worlds import compare_worlds
 
 FOLDER = Path("out/compare")
 # Columns of the comparison with complementarity that are printed; the file has all.

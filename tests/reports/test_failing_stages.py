@@ -194,7 +194,7 @@ STAGES: dict[Callable[[Patch, Path], list[str]], list[str]] = {
     of_proofs: ["two"],
     of_properties: ["a law of each kind"],
     of_counterexamples: ["saturation"],
-    of_bulk: ["factored, no clamp"],
+    of_bulk: ["impacts, factored, no clamp"],
     of_hard_cases: ["grazing, svd", "lost"],
     of_accuracy: [", IAPB, 1 row"],
     of_effects: ["peg_corner, impulses", "arm_pushing"],

@@ -27,7 +27,7 @@ from verification.laws.bounds import KIT, Bounds, Law, LawCount, LawResidual
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS, Contract
 from verification.laws.counterexample import as_test, name_of, search_counterexample, shrink
 from verification.laws.equality import OF_ONE_CALL, UNEQUAL_LAWS
-from verification.laws.resolver import Resolver, ResolverFault, Watched, own_outcome
+from verification.laws.resolver import Resolver, ResolverFault, Watched, own_answer
 
 NOTABLE = 1e-6  # the search prefers counterexamples with a residual above this, which rounding cannot explain
 IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
@@ -295,11 +295,11 @@ def check_passivity(
         broken = next((verdict for verdict in verdicts if not verdict.passed), None)
         example = None if broken is None else _counterexample(
             chosen[broken.law], broken, resolver, bounds, search, seed, ends, contract)
-        returned = "" if example is None else _returned(resolver, example)
+        returned = "" if example is None else own_answer(resolver, example)[0]
     late = "" if done == impacts else f"too slow: {done} of {impacts} impacts in {patience:g} s"
     law = broken.law if broken else ""
     return PassivityReport(name_of(resolver), done, seed, verdicts, example, law, late, bounds, resolver, contract,
-                           returned)
+                           str(returned) if isinstance(returned, ResolverFault) else returned)
 
 
 def _contract(name: str, unequal_restitution: bool) -> Contract:
@@ -345,13 +345,6 @@ def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: 
     if not names:
         raise ArgumentError("laws", laws, one_of("", known, "at least one of "))
     return {name: law for name, law in known.items() if name in names}
-
-
-def _returned(resolver: Resolver, case: ImpactCase) -> Floats | str:
-    try:
-        return own_outcome(resolver, case)
-    except ResolverFault as fault:
-        return str(fault)
 
 
 class _Draw(NamedTuple):

@@ -73,11 +73,11 @@ def _usable(velocity: Floats | ResolverFault) -> Floats:
 
 
 def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> Floats | ResolverFault:
-    """Return a copy of v⁺, or the fault of an unusable answer; raise ResolverFault if the resolver raises."""
+    """Return a copy of v⁺, or the fault of a resolver that raises or gives an unusable answer."""
     try:
         answer = resolver(*given)
     except Exception as error:  # a foreign resolver may raise anything: that is its fault, not an error of the kit
-        raise ResolverFault(f"raised {type(error).__name__}: {error}") from error
+        return ResolverFault(f"raised {type(error).__name__}: {error}")
     try:
         velocity = np.asarray(getattr(answer, "velocity", answer))
     except Exception as error:  # as foreign as the resolver

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from reference.exact import independent_rows
 from verification.impacts import Floats, ImpactCase, cradle_rows
-from verification.laws.scenes import SceneCase, Values
 
 
 @st.composite
@@ -107,61 +106,3 @@ def tangents_are_independent(case: ImpactCase) -> bool:
 # Strategies for the search of counterexamples: one per contract, and one with a restitution per row.
 SEARCHED = {"equality": impact_cases, "unequal": unequal_cases, "unilateral": one_sided_cases,
             "frictional": frictional_cases}
-
-
-@st.composite
-def scenes(draw: st.DrawFn, steps: int = 60) -> SceneCase:
-    """A short scene of simple numbers: one or two discs, and sometimes a link, in a room; any law and rendering."""
-    count, linked = draw(st.integers(1, 2)), draw(st.booleans())
-    bodies = [draw(_discs(k)) for k in range(count)]
-    if linked:
-        angle, spin = draw(st.integers(-3, 3)), draw(st.integers(-9, 9))
-        bodies.append({"name": "link", "joint": "revolute", "mass": 1.0, "inertia": 1e-3,
-                       "center_of_mass": [0.05, 0.0], "position": [float(angle)], "velocity": [float(spin)],
-                       "shapes": [{"kind": "box", "size": [0.1, 0.02], "center": [0.05, 0.0]}]})  # fmt: skip
-    contact = {
-        "forces": "paper",
-        "stiffness": 10.0 ** draw(st.integers(1, 4)), "damping": float(draw(st.sampled_from([0, 1, 10]))),
-        "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
-    }  # fmt: skip
-    walls = [{"name": "floor", "kind": "half_plane", "point": [0.0, -0.2], "normal": [0.0, 1.0]},
-             {"name": "side", "kind": "half_plane", "point": [0.2, 0.0], "normal": [-1.0, 0.0]}]  # fmt: skip
-    rate = float(draw(st.sampled_from([250, 1000])))
-    values = {"name": "small_scene", "rate": rate, "duration": steps / rate, "bodies": bodies, "walls": walls,
-              "integrator": "semi_implicit_euler", "contact": contact,
-              "gravity": draw(st.sampled_from([None, [0.0, -10.0]]))}  # fmt: skip
-    return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))
-
-
-@st.composite
-def _discs(draw: st.DrawFn, k: int) -> Values:
-    """A disc of 0.01 to 10 kg with a velocity of integers."""
-    v = draw(st.lists(st.integers(-3, 3), min_size=3, max_size=3))
-    return {"name": f"disc_{k}", "joint": "planar", "mass": 10.0 ** draw(st.integers(-2, 1)), "inertia": 1e-3,
-            "shapes": [{"kind": "circle", "radius": 0.05}], "position": [0.1 * k, -0.1, 0.0],
-            "velocity": [float(x) for x in v]}  # fmt: skip
-
-
-@st.composite
-def scenes_in_space(draw: st.DrawFn, steps: int = 60) -> SceneCase:
-    """A short spatial scene of simple numbers: a ball and a box, at rest or moving, above a floor and beside a wall."""
-    v = [draw(st.lists(st.integers(-3, 3), min_size=6, max_size=6)) for _ in range(2)]
-    turn = draw(st.sampled_from([[0.0, 0.0, 0.0, 1.0], [0.6, 0.0, 0.0, 0.8], [0.5, 0.5, 0.5, 0.5]]))
-    common = {"joint": "free_flyer", "mass": 10.0 ** draw(st.integers(-1, 1)), "inertia": [1e-3] * 3}
-    bodies = [
-        common | {"name": "ball", "shapes": [{"kind": "sphere", "radius": 0.05}], "velocity": [float(x) for x in v[0]],
-                  "position": [0.0, 0.0, draw(st.sampled_from([0.05, 0.15])), 0.0, 0.0, 0.0, 1.0]},
-        common | {"name": "box", "shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}],
-                  "velocity": [float(x) for x in v[1]], "position": [0.12, 0.0, 0.05, *turn]},
-    ]  # fmt: skip
-    contact = {
-        "forces": "paper",
-        "stiffness": 10.0 ** draw(st.integers(1, 3)), "damping": float(draw(st.sampled_from([0, 1]))),
-        "restitution": draw(st.sampled_from([0.0, 0.5, 1.0])), "friction": draw(st.sampled_from([0.0, 0.3])),
-    }  # fmt: skip
-    walls = [{"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]},
-             {"name": "side", "kind": "half_space", "point": [0.2, 0, 0], "normal": [-1, 0, 0]}]  # fmt: skip
-    values = {"name": "small_scene_in_space", "dimensions": 3, "rate": 1000.0, "duration": steps / 1000.0,
-              "bodies": bodies, "walls": walls, "gravity": draw(st.sampled_from([None, [0.0, 0.0, -10.0]])),
-              "contact": contact, "integrator": "semi_implicit_euler"}  # fmt: skip
-    return SceneCase(values, draw(st.sampled_from(["IAPB", "PB"])))

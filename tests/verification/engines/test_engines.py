@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError, MissingDependencyError
+from iapb.errors import MissingDependencyError
 from reference.simulators import find_simulator, fixed_scene
 from verification import engines
 from verification.engines import ERRORS, compare_engines, measured, row_of, sentence, verdict
@@ -88,11 +88,6 @@ def test_our_own_engine_that_stops_is_a_failure(monkeypatch):
     failures = []
     assert compare_engines(["rigid"], ["bernoulli"], failures=failures) == []
     assert [(one.case, one.reason) for one in failures] == [("rigid on bernoulli", "it broke")]
-
-
-def test_depth_is_checked():
-    with pytest.raises(ArgumentError, match="quick or full"):
-        compare_engines(depth="deep")
 
 
 def test_the_answer_names_every_miss_ours_first():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -33,14 +31,6 @@ def test_the_reference_resolver_keeps_every_law(case: ImpactCase) -> None:
 
 
 @given(case=impact_cases(largest_exponent=14))
-def test_every_budget_is_passive(case: ImpactCase) -> None:
-    for budget in range(case.coordinates + 1):
-        limited = partial(resolve_impact, budget=budget)
-        residual = LAWS["kinetic_energy"].check(case, limited, FACTORED)
-        assert residual is not None and residual.passed, (budget, residual)
-
-
-@given(case=impact_cases(largest_exponent=14))
 @pytest.mark.parametrize("method", [damped, svd])
 def test_filters_of_the_family_are_passive(method: Resolver, case: ImpactCase) -> None:
     residual = LAWS["kinetic_energy"].check(case, method, KIT)
@@ -52,29 +42,6 @@ def test_an_unknown_residual_never_passes() -> None:
     assert not LawResidual("any", np.inf, 1.0).passed
     assert not LawResidual("any", 1e-30, 0.0).passed
     assert LawResidual("any", 0.0, 0.0).passed and LawResidual("any", -1.0, 1e-9).passed
-
-
-def test_momentum_sees_what_energy_does_not() -> None:
-    """Erratum 3: an equal ball at rest, struck; per-body rows bounce it back as from a wall and keep the energy."""
-    case = ImpactCase(np.eye(2), np.array([[1.0, -1.0]]), np.array([-1.0, 0.0]), 1.0, "", np.ones((1, 2)))
-
-    def per_body(M: np.ndarray, J: np.ndarray, v: np.ndarray, e: float) -> object:
-        return resolve_impact(M, np.vstack([np.maximum(J, 0), np.minimum(J, 0)]), v, e)
-
-    assert LAWS["kinetic_energy"].check(case, per_body, KIT).passed
-    assert not LAWS["momentum"].check(case, per_body, KIT).passed
-    assert LAWS["momentum"].check(case, resolve_impact, KIT).passed
-
-
-def test_impulse_range_sees_what_energy_and_restitution_do_not() -> None:
-    case = ImpactCase(np.eye(2), np.array([[1.0, 0.0]]), np.array([-1.0, 1.0]), 0.5)
-
-    def reversed_velocity(M: np.ndarray, J: np.ndarray, v: np.ndarray, e: float) -> np.ndarray:
-        return -e * v
-
-    assert LAWS["kinetic_energy"].check(case, reversed_velocity, KIT).passed
-    assert LAWS["restitution"].check(case, reversed_velocity, KIT).passed
-    assert not LAWS["impulse_range"].check(case, reversed_velocity, KIT).passed
 
 
 def test_rows_that_agree_to_noise_are_compared_up_to_that_noise() -> None:

@@ -97,11 +97,6 @@ def test_every_unsound_resolver_is_found(name: str) -> None:
     assert not report.passed and report.broken_laws, report
 
 
-def test_the_sound_resolver_beneath_them_passes() -> None:
-    report = check_passivity(sound_resolver, impacts=400, search=0)
-    assert report.passed, report
-
-
 @pytest.mark.parametrize("name", BEYOND)
 def test_what_the_kit_cannot_find_is_known(name: str) -> None:
     """A change that brings one of these within reach moves it to the table above."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError
 from verification.check import Study
 from verification.claims import CLAIMS
 from verification.stability.walls import (
@@ -78,11 +77,6 @@ def test_the_paper_s_damping_is_on_the_grid() -> None:
     stiffness, damping = grid("quick")
     assert PAPER_DAMPING in damping and damping[0] == 0.0
     assert (np.diff(damping) > 0.0).all() and (np.diff(stiffness) > 0.0).all()
-
-
-def test_an_unknown_law_is_refused() -> None:
-    with pytest.raises(ArgumentError, match="penalty, impulses"):
-        at(Loop(), 1.0, 1.0, "springs")
 
 
 def test_c20_holds_and_would_not_with_the_bound_in_the_wrong_place() -> None:

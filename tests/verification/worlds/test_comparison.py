@@ -14,12 +14,11 @@ from reference.complementarity import benchmark, solvers
 from reference.complementarity.solution import Answer
 from reference.complementarity.solvers import SOLVERS, SolverEntry
 from reference.worlds import run_world
-from verification import compare_worlds
+from verification import compare_worlds, worlds
 from verification.complementarity import problems
 from verification.complementarity.scene_cases import problems_of_run
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
-from verification.worlds import comparison
-from verification.worlds.comparison import default_worlds
+from verification.worlds import default_worlds
 
 HERE = Path(__file__).parent
 SLOPE = load_scene(HERE / "slope.yaml").with_values({"duration": 0.2})
@@ -76,7 +75,7 @@ def test_a_world_that_fails_is_named_and_the_others_are_compared(monkeypatch):
             raise SolverError("no solution")
         return run_world(scene, world, **options)
 
-    monkeypatch.setattr(comparison, "run_world", breaks)
+    monkeypatch.setattr(worlds, "run_world", breaks)
     short = SLOPE.with_values({"duration": 0.002})
     found = compare_worlds(short, ["IAPB", "PB", "ideal"], "ideal", impacts=0)
     assert found.tables["worlds"].column("world") == ["IAPB", "ideal"]
@@ -90,7 +89,7 @@ def test_a_world_that_stops_early_is_compared_until_then_and_said(monkeypatch):
     def stops(scene, world, **options):
         return run_world(scene, world, **options | ({"steps": 7} if world == "PB" else {}))
 
-    monkeypatch.setattr(comparison, "run_world", stops)
+    monkeypatch.setattr(worlds, "run_world", stops)
     short = SLOPE.with_values({"duration": 0.02})
     found = compare_worlds(short, ["IAPB", "PB", "ideal"], "IAPB", impacts=0)
     assert row(found, "PB")["simulated until"] == pytest.approx(0.007)
@@ -108,7 +107,7 @@ def test_a_world_that_is_not_to_be_trusted_is_not_ranked(monkeypatch):
         run = run_world(scene, world, **options)
         return replace(run, distrust=("the box flew",)) if world == "PB" else run
 
-    monkeypatch.setattr(comparison, "run_world", doubted)
+    monkeypatch.setattr(worlds, "run_world", doubted)
     found = compare_worlds(SLOPE.with_values({"duration": 0.02}), ["IAPB", "PB", "ideal"], "IAPB", impacts=0)
     assert "Closest to IAPB is ideal" in found.answer
     assert "Not ranked: PB not to be trusted: the box flew." in found.answer

@@ -15,6 +15,7 @@ Every complementarity solver then solves the scene's impacts in IAPB; recomputed
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -31,19 +32,23 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import INTERRUPTED
+from reference.complementarity.solvers import SOLVERS
+from reference.datasets import StoredProblem
 from reference.worlds import WORLDS, run_world
+from verification.complementarity.agreement import compare_cases
+from verification.complementarity.problems import VERDICTS, ProblemStudy, study_read
+from verification.complementarity.scene_cases import impacts_of_run, problems_of_run
 from verification.finding import (
     MIXED,
+    NOT_TESTABLE,
     REPRODUCED,
     Failure,
     Finding,
     Part,
-    Table,
     attempt,
     finding_of,
-    titled,
 )
-from verification.worlds.impacts import compare_impacts
+from verification.table import Table, titled
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -54,9 +59,7 @@ QUESTION = (
     "mass: root mean square displacement and velocity of its particles, and the impulse of all contacts so far. "
     "The impacts of IAPB are then given to every complementarity solver."
 )
-DISTANCES = ("configuration", "velocity", "impulse")
-RESULTANT, GENERALIZED = "resultant of all contacts", "generalized, no resultant: M(q) varies"
-_UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}
+_UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the three distances
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ def default_worlds(scene: Scene) -> tuple[str, ...]:
     rough = scene.largest_friction > 0.0
     coupled = scene.hand is not None and scene.couplings.unilateral is not None
     return ("IAPB", "PB", *(["IAPB-friction"] if rough else []), "ideal", *(["ideal-friction"] if rough else []),
-            *(["CBuc"] if coupled else []))  # fmt: skip
+            *(["CBuc"] if coupled else []))
 
 
 def compare_worlds(
@@ -107,13 +110,14 @@ def compare_worlds(
     names, against = _chosen(scene, worlds, against)
     failures: list[Failure] = []
     runs = {name: found for name in names
-            if (found := attempt(f"world {name}", partial(_run, scene, name, say), failures)) is not None}  # fmt: skip
+            if (found := attempt(f"world {name}", partial(_run, scene, name, say), failures)) is not None}
     if against not in runs:
         reason = next((one.reason for one in failures if one.case == f"world {against}"), "")
         raise IapbError(f"{scene.name} cannot be simulated in the reference world {against}: {reason}; "
                         "choose another with `against`")
     mechanism = mechanism_of(scene)
-    impulse = RESULTANT if mechanism.has_constant_mass_matrix else GENERALIZED
+    impulse = ("resultant of all contacts" if mechanism.has_constant_mass_matrix
+               else "generalized, no resultant: M(q) varies")
     unfit = {name: why for name, found in runs.items() if (why := _unfit(scene, found.run))}
     series = {name: _series(mechanism, found.run, runs[against].run) for name, found in runs.items()}
     tables = {"worlds": _worlds_table(runs, series, against, impulse), "over time": _series_table(series)}
@@ -126,7 +130,7 @@ def compare_worlds(
     finding = finding_of(f"worlds of {scene.name}", scene.title or scene.name, QUESTION,
                          _answer(runs, series, against, unfit), parts, tables, failures)
     return replace(finding, details={"scene": scene.name, "worlds": ", ".join(runs), "against": against,
-                                     "impulse": impulse})  # fmt: skip
+                                     "impulse": impulse})
 
 
 def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> tuple[tuple[str, ...], str]:
@@ -162,7 +166,7 @@ def _run(scene: Scene, world: str, say: Progress) -> WorldRun:
 
 def _series(mechanism: Mechanism, run: Run, reference: Run) -> dict[str, Floats]:
     """Return all compared quantities over time, at the instants that both runs have."""
-    at = _instants(reference)
+    at = np.unique(np.linspace(0, reference.steps, min(reference.steps, INSTANTS) + 1).round().astype(np.int64))
     at = at[at <= run.steps]
     q, v = reference.q[at], reference.v[at]
     mass, whole = mechanism.mass_matrices(q), float(mechanism.arrays.mass.sum())
@@ -170,14 +174,13 @@ def _series(mechanism: Mechanism, run: Run, reference: Run) -> dict[str, Floats]
     given = _given(run)[at] - _given(reference)[at]
     answer = np.linalg.solve(mass, given[:, :, None])[:, :, 0]
     forms = {"configuration": _form(mass, moved) / whole, "velocity": _form(mass, run.v[at] - v) / whole,
-             "impulse": np.einsum("ki,ki->k", given, answer) * whole}  # fmt: skip
-    found = {"time": run.time[at]} | {name: np.sqrt(np.maximum(form, 0.0)) for name, form in forms.items()}
-    return found | {"energy": run.energy["kinetic"][at] + run.energy["potential"][at],
-                    "penetration": _deepest_until(run, at)}  # fmt: skip
-
-
-def _instants(run: Run) -> NDArray[np.int64]:
-    return np.unique(np.linspace(0, run.steps, min(run.steps, INSTANTS) + 1).round().astype(np.int64))
+             "impulse": np.einsum("ki,ki->k", given, answer) * whole}
+    depth, steps = np.zeros(run.steps + 1), np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
+    np.maximum.at(depth, steps + 1, -run.contacts.gap)
+    since = np.minimum(np.concatenate([[0], at[:-1] + 1]), run.steps)  # the deepest since the previous instant
+    return {"time": run.time[at], **{name: np.sqrt(np.maximum(form, 0.0)) for name, form in forms.items()},
+            "energy": run.energy["kinetic"][at] + run.energy["potential"][at],
+            "penetration": np.maximum.reduceat(depth, since)}
 
 
 def _form(matrices: Floats, vectors: Floats) -> Floats:
@@ -190,14 +193,6 @@ def _given(run: Run) -> Floats:
     return np.vstack([np.zeros(run.v.shape[1]), np.cumsum(run.environment_force, axis=0) * run.dt])
 
 
-def _deepest_until(run: Run, at: NDArray[np.int64]) -> Floats:
-    """Return the deepest overlap [m] in the steps between each instant and the previous one."""
-    depth = np.zeros(run.steps + 1)
-    steps = np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
-    np.maximum.at(depth, steps + 1, -run.contacts.gap)
-    return np.maximum.reduceat(depth, np.minimum(np.concatenate([[0], at[:-1] + 1]), run.steps))
-
-
 def _worlds_table(
     runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str, impulse: str
 ) -> Table:
@@ -205,18 +200,18 @@ def _worlds_table(
     rows = []
     for name, found in runs.items():
         run, apart = found.run, series[name]
-        far = [value for key in DISTANCES for value in _sizes(apart[key])] if name != against else [None] * 9
+        far = [value for key in _UNITS for value in _sizes(apart[key])] if name != against else [None] * 9
         rows.append((name, run.law, ", ".join(ignored_fields(run.effects)) or None, float(run.time[-1]), *far,
                      *_energies(run), 1e3 * float(max(0.0, -run.contacts.gap.min(initial=0.0))), len(run.impacts.step),
-                     1e6 * found.seconds, found.seconds / fastest))  # fmt: skip
-    far_titles = [f"{name}, {which} [{_UNITS[name]}]" for name in DISTANCES for which in ("rms", "most", "end")]
+                     1e6 * found.seconds, found.seconds / fastest))
+    far_titles = [f"{name}, {which} [{_UNITS[name]}]" for name in _UNITS for which in ("rms", "most", "end")]
     return titled(
         ("world", "law", "ignores", "simulated until [s]", *far_titles, "kinetic energy at the end [J]",
          "work done [J]", "energy lost [J]", "most above start and work [J]", "deepest overlap [mm]", "impacts",
          "time per step [µs]", "times the fastest"), rows, 3,
         f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. Impulse: "
         f"{impulse}. Lost: start and work done, minus the end. The time is the processor's, without set-up.",
-        timed=("time per step [µs]", "times the fastest"))  # fmt: skip
+        timed=("time per step [µs]", "times the fastest"))
 
 
 def _sizes(values: Floats) -> tuple[float, float, float]:
@@ -237,7 +232,7 @@ def _energies(run: Run) -> tuple[float | None, ...]:
 def _series_table(series: dict[str, dict[str, Floats]]) -> Table:
     units = {"time": "s", **_UNITS, "energy": "J", "penetration": "m"}
     rows = [(name, *map(float, row)) for name, found in series.items()
-            for row in zip(*(found[key] for key in units), strict=True)]  # fmt: skip
+            for row in zip(*(found[key] for key in units), strict=True)]
     return titled(("world", *(f"{key} [{unit}]" for key, unit in units.items())), rows)
 
 
@@ -274,4 +269,78 @@ def _answer(
     ratio = runs[against].seconds / runs[closest].seconds
     speed = f"{ratio:.3g} times as fast" if ratio >= 1.0 else f"{1.0 / ratio:.3g} times as slow"
     return (f"Closest to {against} is {closest}: {1e3 * rms:.3g} mm apart (rms over mass and time), "
-            f"{1e3 * most:.3g} mm at most; its step is {speed}.{left_out}")  # fmt: skip
+            f"{1e3 * most:.3g} mm at most; its step is {speed}.{left_out}")
+
+
+# The impacts of IAPB as complementarity problems, with and without friction, for every solver.
+LONGEST = 0.4  # [s] a solver that takes longer on one impact skips larger ones
+CASES = 200  # largest number of impacts for which IAPB's motion is compared with that of the Newton LCP
+
+
+def compare_impacts(
+    run: Run, scene: Scene, most: int, progress: Progress, failures: list[Failure]
+) -> tuple[list[Part], dict[str, Table]]:
+    """Return the parts on the impacts of an IAPB run, and the tables "solvers" and "problems"."""
+    problems, left_out = problems_of_run(run, scene, most)
+    if not problems:
+        why = f"{left_out} impacts follow another law than (21)" if left_out else "nothing collides"
+        said = f"No impact of {scene.name} can be given to solvers: {why}."
+        return [Part(said, NOT_TESTABLE, "impacts", optional=True)], {}
+    stored = [StoredProblem(problem, format="built here") for problem in problems]
+    study = study_read(f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures)
+    return [_motion(run, scene, failures), _solved(study)], {"solvers": _solvers(study), "problems": _problems(study)}
+
+
+def _motion(run: Run, scene: Scene, failures: list[Failure]) -> Part:
+    """Return the part on whether IAPB's impacts equal those of the Newton LCP, as they do if all contacts push."""
+    compared = compare_cases(impacts_of_run(run, scene).cases[:CASES], failures=failures)
+    agree, push = sum(one.agrees for one in compared), sum(one.pushes for one in compared)
+    sentence = (f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
+                f"{len(compared) - push} an impulse pulls. The largest distance is "
+                f"{max(one.distance for one in compared):.2g} of |v⁻|.")
+    return Part(sentence, REPRODUCED if agree == len(compared) else MIXED, "motion", agree, len(compared))
+
+
+def _solved(study: ProblemStudy) -> Part:
+    """Return the part on correct answers and on solvers with wrong ones; a refusal or an error is no answer."""
+    solved = [row for row in study.rows if row.verdict == "solved"]
+    wrong = Counter(row.solver for row in study.rows if row.verdict == "failed" and np.isfinite(row.residuals.worst))
+    answers = len(solved) + wrong.total()
+    unsolved = [line.problem for line in study.lines if "solved" not in dict(line.verdicts).values()]
+    sentence = (f"{len(solved)} of {answers} answers are solutions, by residuals recomputed from the problem; "
+                f"{len(study.lines) - len(unsolved)} of {len(study.lines)} problems have one.")
+    if wrong:
+        sentence += f" Wrong answers: {', '.join(f'{solver} {count}' for solver, count in wrong.items())}."
+    verdict = MIXED if unsolved or wrong else REPRODUCED
+    return Part(sentence, verdict, "solvers", len(solved), answers, timed=True)
+
+
+def _solvers(study: ProblemStudy) -> Table:
+    """Return a table with one row per solver."""
+    rows = []
+    for solver in study.solvers:
+        mine = [row for row in study.rows if row.solver == solver]
+        solved = [row for row in mine if row.verdict == "solved"]
+        counts = [sum(row.verdict == verdict for row in mine) for verdict in VERDICTS[1:]]
+        rows.append((solver, "friction" if SOLVERS[solver].takes == "cone" else "none", len(mine), len(solved), *counts,
+                     max((row.residuals.worst for row in solved), default=None),
+                     max((row.spread for row in solved), default=None),
+                     float(np.median([1e6 * row.seconds for row in solved])) if solved else None))
+    return titled(("solver", "friction", "problems", *VERDICTS, "worst residual", "spread of velocities",
+                   "median time [µs]"), rows, 3,
+                  "Residuals are recomputed from the problem, relative to its velocities; solved: at most 1e-6.",
+                  timed=("median time [µs]", "left out"))
+
+
+def _problems(study: ProblemStudy) -> Table:
+    """Return a table with one row per solver and problem."""
+    size = {line.problem: line for line in study.lines}
+    rows = [(row.problem, size[row.problem].unknowns, size[row.problem].rank, row.solver, row.verdict,
+             _known(row.residuals.worst), _known(row.spread), _known(1e6 * row.seconds), row.note)
+            for row in study.rows]
+    return titled(("problem", "unknowns", "rank", "solver", "outcome", "worst residual", "spread of velocities",
+                   "time [µs]", "note"), rows, 3, timed=("time [µs]", "note"))
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
