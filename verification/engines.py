@@ -158,7 +158,7 @@ def measured(scene: FixedScene, motion: Trajectory) -> dict[str, Any]:
     if scene.rests:
         places, half = motion.position, motion.position[len(motion.position) // 2]
         return common | {"drift": float(np.linalg.norm(places - places[0], axis=-1).max()),
-                         "creep": float(np.linalg.norm(places - half, axis=-1).max())}
+                         "creep": float(np.linalg.norm(places[-1] - half, axis=-1).max())}
     truth = np.array(scene.final_velocities)
     true_energy = 0.5 * float(masses @ (truth**2).sum(axis=1))
     speeds, off = np.linalg.norm(motion.velocity[0], axis=1), motion.velocity[-1] - truth

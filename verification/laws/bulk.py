@@ -85,7 +85,7 @@ class BulkImpacts:
         """
         decade = np.floor(np.log10(self.condition) + 1e-9).astype(int)
         groups = [(f"1e{k}", decade == k) for k in np.unique(decade)]
-        for name, chosen in [*groups, ("all", decade == decade)]:
+        for name, chosen in [*groups, ("all", np.ones(len(decade), bool))]:
             ratio, gains = (self.gain / self.bound)[chosen], self.gain[chosen]
             yield (name, int(np.sum(chosen)), float(np.max(gains)), float(np.max(ratio)),
                    float(np.max(gains / self.cholesky_bound[chosen])), int(np.sum(ratio > 1.0)),

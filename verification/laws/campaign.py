@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -88,13 +88,8 @@ def plan(impacts: int, trajectories: int, parts: tuple[str, ...] = PARTS) -> tup
     totals = {IMPACTS: impacts, TRAJECTORIES: trajectories}
     totals |= {part: round(share * impacts) for part, share in _SHARE.items()}
     totals |= {part: round(share * trajectories) for part, share in _PER_TRAJECTORY.items()}
-    return tuple(batch for part in parts for batch in _batches(part, totals[part]))
-
-
-def _batches(part: str, total: int) -> Iterator[Batch]:
-    size = BATCH.get(part, _BATCH)
-    for first in range(0, total, size):
-        yield Batch(part, first, min(size, total - first))
+    return tuple(Batch(part, first, min(size, totals[part] - first))
+                 for part in parts for size in (BATCH.get(part, _BATCH),) for first in range(0, totals[part], size))
 
 
 def drawn(part: str, index: int, subject: Subject) -> Any:
@@ -137,7 +132,7 @@ def residuals(
     return {name: residual for name, residual in tried.items() if residual is not None}, None
 
 
-def do_batch(batch: Batch, subject: Subject, progress: Callable[[int], None] | None = None) -> BatchOutcome:
+def do_batch(batch: Batch, subject: Subject) -> BatchOutcome:
     """Check every case of a batch against the laws of its part."""
     started, counts, found = time.perf_counter(), dict[str, LawCount](), list[Found]()
     with one_thread():
@@ -150,6 +145,4 @@ def do_batch(batch: Batch, subject: Subject, progress: Callable[[int], None] | N
                     struck = strike(batch.part, case, subject.resolver)
                     # replace() makes a copy without the cached answers of the laws
                     found.append(Found(law, batch.part, index, residual, replace(case), run, struck))
-            if progress is not None:
-                progress(index + 1 - batch.first)
     return BatchOutcome(tuple(counts.values()), tuple(found), time.perf_counter() - started)

@@ -28,7 +28,7 @@ from verification.stability.device_port import (
     RADIUS,
     DeviceLoop,
     actuator_forces,
-    entered_energy,
+    leaked,
 )
 
 
@@ -248,8 +248,7 @@ def leak(case: WallInTheHand, wall: Wall) -> float:
     x = case.readings
     rate = np.concatenate([[0.0], np.diff(x) / case.dt])[:-1]
     force = [wall(float(a), float(r), case.stiffness, case.damping) for a, r in zip(x[:-1], rate, strict=True)]
-    entered = entered_energy(x, -np.array(force), case.device_damping, case.dt)
-    return max(0.0, -float(np.min(entered, initial=0.0)))
+    return leaked(x, -np.array(force), case.device_damping, case.dt)
 
 
 def hand_port_is_passive(case: WallInTheHand, subject: Wall) -> LawResidual:
@@ -296,11 +295,10 @@ def device_port_is_passive(case: HeldDevice, subject: Callable[[DeviceLoop, Floa
     The tolerance covers the rounding of n sums and of the coupler's extension, which is a difference of two positions.
     """
     x, dt = case.positions, case.loop.dt
-    leaked = max(0.0, -float(np.min(entered_energy(x, subject(case.loop, x), case.device_damping, dt))))
-    steps = np.diff(x)
+    out, steps = leaked(x, subject(case.loop, x), case.device_damping, dt), np.diff(x)
     turnover = (case.device_damping + case.loop.bound) * float(np.sum(steps**2)) / dt
     places = RADIUS / float(np.sqrt(np.mean(steps**2)))
-    return LawResidual("device_port", leaked / turnover, 4.0 * len(x) * EPS * (1.0 + places))
+    return LawResidual("device_port", out / turnover, 4.0 * len(x) * EPS * (1.0 + places))
 
 
 def finite_or_named(case: ImpactCase, subject: Resolver) -> LawResidual:

@@ -134,6 +134,11 @@ def entered_energy(positions: Floats, forces: Floats, device_damping: float, dt:
     return np.asarray(np.cumsum(-forces * change + device_damping * change**2 / dt))
 
 
+def leaked(positions: Floats, forces: Floats, device_damping: float, dt: float) -> float:
+    """Return the largest net energy [J] that the hand has drawn by the end of a step; 0 if it never draws any."""
+    return max(0.0, -float(np.min(entered_energy(positions, forces, device_damping, dt))))
+
+
 def needed_damping(positions: Floats, forces: Floats, dt: float) -> float:
     """Return the least b [N s/m] for which the hand extracts no energy on this motion."""
     change = np.diff(positions)
@@ -169,7 +174,7 @@ def _leak(study: Study, case: Case) -> dict[str, Any]:
         x = hand_positions(loop, kind, share)
         forces = actuator_forces(loop, x)
         needed = max(needed, needed_damping(x, forces, loop.dt))
-        came_out = max(0.0, -float(np.min(entered_energy(x, forces, loop.bound, loop.dt))))
+        came_out = leaked(x, forces, loop.bound, loop.dt)
         turned = 2.0 * loop.bound * float(np.sum(np.diff(x) ** 2)) / loop.dt
         leak, turned_over = max((leak, turned_over), (came_out, turned))
     return {

@@ -21,7 +21,7 @@ from verification.laws.bounds import KIT
 from verification.laws.counterexample import as_test, shrink
 from verification.laws.planted import each_contact_its_own_restitution, wrong_sign
 from verification.laws.resolver import Resolver
-from verification.methods import gram_pinv, svd
+from verification.methods import svd
 
 
 @pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, svd])
@@ -40,41 +40,9 @@ def test_every_planted_bug_is_caught_by_its_law(law: str, make: Callable[[], Res
     assert not report.passed and law in report.broken_laws, report
 
 
-class _Remembered:
-    """A resolver whose answers are kept: a BLAS may round a second call of the same impact in another way."""
-
-    def __init__(self, resolver: Resolver) -> None:
-        self.resolver, self.answers = resolver, dict[bytes, Floats]()
-
-    def __call__(self, M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-        answer = self.resolver(M, J, v, e)
-        self.answers[_bits(M, J, v, e)] = np.array(getattr(answer, "velocity", answer))
-        return self.answers[_bits(M, J, v, e)]
-
-    def exact_gain(self, case: ImpactCase) -> float:
-        """The relative gain of the last answer to a case, in exact rationals."""
-        M, J, v = case.mass_matrix, case.contact_jacobian, case.velocity
-        return relative_energy_gain(M, v, self.answers[_bits(M, J, v, case.restitution)])
-
-
-def _bits(M: Floats, J: Floats, v: Floats, e: float) -> bytes:
-    return b"".join(np.ascontiguousarray(array).tobytes() for array in (M, J, v, np.array(e)))
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_the_printed_formula_is_found_to_gain_energy(seed: int) -> None:
-    """How much it gains is up to the BLAS; that the reported gains are gains, exact rationals say."""
-    resolver = _Remembered(gram_pinv)
-    report = check_passivity(resolver, impacts=100, seed=seed, search=60)
-    assert not report.passed and report.broken_laws[0] == report.counterexample_law == "kinetic_energy"
-    for case in (report.counterexample, report.verdict("kinetic_energy").worst_case):
-        assert resolver.exact_gain(case) > KIT.energy_gain(case)
-
-
 def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() -> None:
     """(1 + e)(1 + δ) times the projection P u changes the energy by its factor f (f − 2) of |P u|² / |u|²."""
-    resolver = _Remembered(returns_too_much)
-    report = check_passivity(resolver, impacts=60, search=60)
+    report = check_passivity(returns_too_much, impacts=60, search=60)
     verdict, case = report.verdict("kinetic_energy"), report.counterexample
     most = float(2 * TOO_MUCH * (2 * TOO_MUCH - 2))
     assert verdict.largest == pytest.approx(most, rel=1e-12)  # e = 1 and rows that see all of the motion: rounded once
@@ -84,8 +52,9 @@ def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() ->
         M, J, v, e = found.mass_matrix, found.contact_jacobian, found.velocity, found.restitution
         plastic, factor = exact_impact(M, J, v, 0), (1 + Fraction(e)) * TOO_MUCH
         share = 1 - plastic.energy_after / plastic.energy_before
-        assert resolver.exact_gain(found) == pytest.approx(float(factor * (factor - 2) * share), rel=1e-9)
-    assert verdict.worst.value == pytest.approx(resolver.exact_gain(verdict.worst_case), rel=1e-12)
+        gain = relative_energy_gain(M, v, returns_too_much(M, J, v, e))
+        assert gain == pytest.approx(float(factor * (factor - 2) * share), rel=1e-9)
+    assert verdict.worst.value == pytest.approx(gain, rel=1e-12)  # of the worst case
 
 
 @pytest.mark.parametrize("index", range(3))
