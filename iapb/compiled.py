@@ -51,23 +51,16 @@ def _stamped_files() -> list[Path]:
             if path.name in _READ_BY_KERNELS or b"@kernel" in path.read_bytes()]
 
 
-def _source_stamp() -> str:
-    """Hash these files. Numba alone would keep a cached kernel after a change of a kernel that it calls."""
-    digest = hashlib.sha256()
-    for path in _stamped_files():
-        digest.update(str(path.relative_to(Path(__file__).parent)).encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
-
-
-_STAMP = _source_stamp()
+# Numba alone would keep a cached kernel after a change of a kernel that it calls.
+_STAMP = hashlib.sha256(b"\0".join(b"%s %s" % (path.name.encode(), path.read_bytes()) for path in _stamped_files()))
 
 
 def _stamp_of(function: Callable[..., Any]) -> str:
-    """Hash the files that a kernel depends on: all kernels of the engine, and its own file if that lies elsewhere."""
-    path = Path(inspect.getfile(function))
-    if path.is_relative_to(Path(__file__).parent):
-        return _STAMP
-    return hashlib.sha256(_STAMP.encode() + path.read_bytes()).hexdigest()
+    """Hash the files that a kernel depends on: those of the engine, and its own file if that lies elsewhere."""
+    path, digest = Path(inspect.getfile(function)), _STAMP.copy()
+    if not path.is_relative_to(Path(__file__).parent):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def flag(on: bool) -> Any:

@@ -79,35 +79,24 @@ def test_what_is_not_inlined_has_no_name_that_another_library_could_be_given(mon
     assert kept and all(part.linkage == llvm.Linkage.private for part in kept)
 
 
-def _has(owner: Any, *names: str) -> list[str]:
-    return [f"{getattr(owner, '__name__', owner)}.{name}" for name in names if not hasattr(owner, name)]
-
-
 def test_what_is_used_of_numbas_internals_is_still_there() -> None:
     """A canary: after an update of numba it names what is gone, before kernels fail in ways that are hard to read."""
     from numba.core import cgutils, codegen, compiler, imputils, typed_passes
-    from numba.core.dispatcher import Dispatcher
 
-    options = llvm.create_pipeline_tuning_options(speed_level=3)
     dispatcher = kernel(lambda x: x)
-    gone = [
-        *_has(codegen.JITCodeLibrary, "_optimize_functions", "_optimize_final_module", "finalize",
-              "enable_object_caching"),
-        *_has(codegen.CPUCodegen, "_create_empty_module"),
-        *_has(typed_passes.NativeLowering, "run_pass"),
-        *_has(compiler.DefaultPassBuilder, "define_nopython_pipeline"),
-        *_has(Dispatcher, "get_call_template", "get_overload", "compile", "enable_caching", "add_overload"),
-        *_has(dispatcher, "overloads", "_cache"),
-        *_has(options, "loop_vectorization", "inlining_threshold"),
-        *_has(llvm, "create_pass_builder", "Linkage"),
-        *_has(cgutils, "is_not_null"),
-        *_has(imputils, "impl_ret_borrowed"),
-    ]
-    assert not gone, f"numba {numba.__version__} lacks {', '.join(gone)}: see iapb/compiled.py and iapb/inlining.py"
-    library = dispatcher.targetctx.codegen().create_library("canary")
-    assert not _has(library, "_codegen", "_final_module", "_linking_libraries", "_finalized")
     dispatcher.enable_caching()
-    assert not _has(dispatcher._cache._cache_file, "_source_stamp")
+    library = dispatcher.targetctx.codegen().create_library("canary")
+    used = [
+        (codegen.JITCodeLibrary, "_optimize_functions _optimize_final_module finalize enable_object_caching"),
+        (typed_passes.NativeLowering, "run_pass"), (compiler.DefaultPassBuilder, "define_nopython_pipeline"),
+        (dispatcher, "get_call_template get_overload compile add_overload overloads"),
+        (dispatcher._cache._cache_file, "_source_stamp"),
+        (library, "_codegen _final_module _linking_libraries _finalized"),
+        (llvm.create_pipeline_tuning_options(speed_level=3), "loop_vectorization inlining_threshold"),
+        (llvm, "create_pass_builder Linkage"), (cgutils, "is_not_null"), (imputils, "impl_ret_borrowed"),
+    ]
+    gone = [f"{owner}.{name}" for owner, names in used for name in names.split() if not hasattr(owner, name)]
+    assert not gone, f"numba {numba.__version__} lacks {', '.join(gone)}: see iapb/compiled.py and iapb/inlining.py"
 
 
 def test_an_array_is_handed_over_as_numba_lays_it_out() -> None:
