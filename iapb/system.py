@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from iapb.advice.checks import settled
 from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for, facts_of
 from iapb.compiled import Entry, block, flag
-from iapb.contact.geometry import ContactBuffer, contact_capacity, make_contact_buffer
+from iapb.contact.geometry import ContactBuffer, contact_capacity
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
 from iapb.contact.kernels.coulomb import RestWork
 from iapb.contact.kernels.impact import ImpactWork
@@ -101,7 +101,7 @@ class System:
         """
         if np.isnan(margin):
             raise ArgumentError("margin", margin, "a distance in metres, infinity allowed")
-        buffer, count = make_contact_buffer(self.capacity), 0
+        buffer, count = zeros_of(ContactBuffer, contact=self.capacity), 0
         if len(self.pairs):
             count = int(detect(block(self.shapes), self.pairs, *self.mechanism.placements(q), float(margin), buffer))
         if count < 0:
@@ -174,8 +174,8 @@ class System:
         state = State(
             **blank(quantities(State), {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows,
                                         "root": 9 * trees}),
-            body=make_workspace(len(mechanism.bodies), d), contacts=make_contact_buffer(c),
-            previous=make_contact_buffer(c), stage_contacts=make_contact_buffer(c),
+            body=make_workspace(len(mechanism.bodies), d), contacts=zeros_of(ContactBuffer, contact=c),
+            previous=zeros_of(ContactBuffer, contact=c), stage_contacts=zeros_of(ContactBuffer, contact=c),
             work=zeros_of(ImpactWork, velocity=d, row=rows),
             push_work=zeros_of(PushWork, velocity=d, row=rows, passive=d + 1),
             friction_work=zeros_of(FrictionWork, velocity=d * sliding, row=rows * sliding,

@@ -28,6 +28,7 @@ from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.parts import LARGEST_NUMBER, written
+from iapb.schema import zeros_of
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]  # numbers of contacts
@@ -107,7 +108,7 @@ class Start:
         corners = np.where(kind == geometry.BOX, 8, np.maximum(self.shapes.count, 2))
         room = int(corners[self.pairs].sum()) + 32 if few else geometry.contact_capacity(self.shapes, self.pairs)
         margin = math.inf if few else max((size for size in sizes if size < math.inf), default=0.0)
-        out, stops = geometry.make_contact_buffer(room + len(self.stops.body)), self.stops
+        out, stops = zeros_of(geometry.ContactBuffer, contact=room + len(self.stops.body)), self.stops
         count = max(int(detect(block(self.shapes), self.pairs, *places, margin, out)), 0) if len(self.pairs) else 0
         new = slice(count, count + len(stops.body))
         out.gap[new], out.normal[new] = stops.arm * stops.sign * (self.q[stops.coordinate] - stops.bound), 0.0

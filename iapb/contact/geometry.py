@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from iapb.compiled import flag
-from iapb.schema import Booleans, Floats, Indices, Integers, States, blank, quantities
+from iapb.schema import Booleans, Floats, Indices, Integers, States
 
 HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
 HALF_SPACE, SPHERE, BOX = 3, 4, 5
@@ -102,11 +102,6 @@ def candidate_pairs(shapes: Shapes) -> Indices:
     swapped = (one < 0) | (0 <= other) & (other < one)
     pairs = np.column_stack([np.where(swapped, j, i), np.where(swapped, i, j)])
     return pairs[one != other].astype(np.int32)
-
-
-def make_contact_buffer(capacity: int) -> ContactBuffer:
-    """Return an empty buffer for `capacity` contacts."""
-    return ContactBuffer(**blank(quantities(ContactBuffer), {"contact": capacity}))
 
 
 def contact_capacity(shapes: Shapes, pairs: Indices) -> int:

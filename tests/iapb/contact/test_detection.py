@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.contact.geometry import make_contact_buffer
+from iapb.contact.geometry import ContactBuffer
 from iapb.contact.kernels.contact_set import ALIGNED_COSINE, cluster, mark_new
 from iapb.errors import IapbError
 from iapb.scene import Scene
+from iapb.schema import zeros_of
 from iapb.simulation import simulate
 from iapb.system import System
 from tests.iapb.contact.paper import contacts_between, scene_of, solids
@@ -238,11 +239,11 @@ def test_what_faces_as_a_neighbour_did_is_the_same_contact_and_nothing_else(
     cosine: float, old: bool, swapped: bool
 ) -> None:
     """Two contacts on one place: of one surface up to the angle, and never of other bodies."""
-    both = make_contact_buffer(2)
+    both = zeros_of(ContactBuffer, contact=2)
     both.normal[:], both.gap[:], both.feature[:] = [[1.0, 0.0, 0.0], [cosine, 0.0, 0.0]], -1.0, [0, 1]
     both.shape_b[:] = 1
     both.body_a[:], both.body_b[:] = ([0, 1], [1, 0]) if swapped else ([0, 0], [1, 1])
-    before, same = make_contact_buffer(1), old and not swapped
+    before, same = zeros_of(ContactBuffer, contact=1), old and not swapped
     for field in both._fields:
         getattr(before, field)[:] = getattr(both, field)[1:]
     mark_new(both, 1, before, 1, 1.0)
