@@ -43,7 +43,11 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
     Contacts are visited deepest first. A contact is kept unless a deeper kept contact of its surface is closer than
     `distance`. So kept contacts of a surface are at least `distance` apart; they keep their order.
     """
-    if count < 2:
+    near = False  # usually none are, and to see this is cheaper than the clustering
+    for i in range(count):
+        for j in range(i):
+            near = near or squared_distance(contacts, i, contacts, j) < distance * distance
+    if not near:
         return count
     contacts.mark[:count] = _UNDECIDED
     while True:
