@@ -185,7 +185,7 @@ class Check:
     def sentences(self, table: Table) -> tuple[Part, ...]:
         """Return what a topic says of the judged table; nothing if the table is neither judged nor told."""
         if self.says is None:
-            if not table.holds:
+            if self.holds is None and not table.holds:
                 return ()
             said: Said = f"{self.question} {sum(table.decided)} of {len(table.decided)} rows hold."
         else:

@@ -176,12 +176,12 @@ def verdict_of_trials(holds: Iterable[bool | None]) -> str:
     "reproduced where" needs a confirmed region: see `judge_part`.
     """
     decided = [outcome for outcome in holds if outcome is not None]
-    if not decided:
-        return NOT_TESTABLE
-    share = sum(decided) / len(decided)
-    if share == 1.0:
-        return REPRODUCED
-    return MIXED if share >= LEAST_SHARE else REFUTED
+    return verdict_of_share(sum(decided) / len(decided)) if decided else NOT_TESTABLE
+
+
+def verdict_of_share(share: float) -> str:
+    """Return the verdict on a claim that holds in this share of the trials."""
+    return REPRODUCED if share == 1.0 else MIXED if share >= LEAST_SHARE else REFUTED
 
 
 def verdict_of_law(holds: Iterable[bool | None]) -> str:

@@ -68,6 +68,10 @@ class Table:
         """Return the rows as dictionaries by key."""
         return [dict(zip(self.keys, row, strict=True)) for row in self.rows]
 
+    def by_title(self) -> list[dict[str, Any]]:
+        """Return the rows as dictionaries by title, as a `Check` returns them."""
+        return [dict(zip(self.titles, row, strict=False)) for row in self.rows]
+
     def only(self, kept: Iterable[bool]) -> Table:
         """Return the rows whose entry in `kept` is true, with their outcomes."""
         chosen = [k for k, keep in enumerate(kept) if keep]

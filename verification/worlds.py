@@ -36,8 +36,8 @@ from reference.complementarity.solvers import SOLVERS
 from reference.datasets import StoredProblem
 from reference.worlds import WORLDS, run_world
 from verification.complementarity.agreement import compare_cases
-from verification.complementarity.problems import VERDICTS, ProblemStudy, study_read
-from verification.complementarity.scene_cases import impacts_of_run, problems_of_run
+from verification.complementarity.of_runs import impacts_of_run, problems_of_run
+from verification.complementarity.solvers import VERDICTS, ProblemStudy, study_read
 from verification.finding import (
     MIXED,
     NOT_TESTABLE,
@@ -306,7 +306,7 @@ def _solved(study: ProblemStudy) -> Part:
     solved = [row for row in study.rows if row.verdict == "solved"]
     wrong = Counter(row.solver for row in study.rows if row.verdict == "failed" and np.isfinite(row.residuals.worst))
     answers = len(solved) + wrong.total()
-    unsolved = [line.problem for line in study.lines if "solved" not in dict(line.verdicts).values()]
+    unsolved = [line["problem"] for line in study.lines if "solved" not in line.values()]
     sentence = (f"{len(solved)} of {answers} answers are solutions, by residuals recomputed from the problem; "
                 f"{len(study.lines) - len(unsolved)} of {len(study.lines)} problems have one.")
     if wrong:
@@ -334,8 +334,8 @@ def _solvers(study: ProblemStudy) -> Table:
 
 def _problems(study: ProblemStudy) -> Table:
     """Return a table with one row per solver and problem."""
-    size = {line.problem: line for line in study.lines}
-    rows = [(row.problem, size[row.problem].unknowns, size[row.problem].rank, row.solver, row.verdict,
+    size = {line["problem"]: line for line in study.lines}
+    rows = [(row.problem, size[row.problem]["unknowns"], size[row.problem]["rank"], row.solver, row.verdict,
              _known(row.residuals.worst), _known(row.spread), _known(1e6 * row.seconds), row.note)
             for row in study.rows]
     return titled(("problem", "unknowns", "rank", "solver", "outcome", "worst residual", "spread of velocities",

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from iapb.errors import ArgumentError
 from reference.datasets import problem_files, write_fclib
+from reference.worlds import run_world
 from reports.commands.as_json import Json, print_json
 from reports.commands.lines import sentence, table_lines
 from reports.commands.progress import stage_progress
@@ -22,12 +22,10 @@ from reports.figures.figure import NotComputed, draw
 from reports.figures.standalone import standalone
 from reports.figures.worlds import worlds as worlds_figure
 from reports.store.keys import plain
-from verification.complementarity.complementarity import finding_of_study
-from verification.complementarity.findings import problems as problem_parts
-from verification.complementarity.problems import FACTORS, ProblemStudy, own_problems, study_problems
-from verification.complementarity.study import compare as study_all
-from verification.complementarity.tables import problems as problems_table
-from verification.finding import Failure, Finding, Table, finding_of, titled
+from verification.check import Topic
+from verification.complementarity.solvers import collections, own_problems
+from verification.complementarity.topic import complementarity
+from verification.finding import Finding, Table, titled
 from verification.worlds import compare_worlds
 
 FOLDER = Path("out/compare")
@@ -81,19 +79,18 @@ def compare(
             count = _export(export)
         print(f"{count} problems written to {export}")
         return
-    figure = ""
+    figure, folders = "", {str(folder): folder for folder in problems or ()}
     with stage_progress() as progress:
         if scene is not None:
             found = compare_worlds(scene_given(scene, set_), worlds.split(",") if worlds else None, against,
                                    impacts=impacts, progress=progress)  # fmt: skip
             lines, place, figure = _scene_lines(found), out or FOLDER / f"{found.details['scene']}.json", _figure(found)
         elif only_problems:
-            found, lines = _problems_alone(problems or (), progress)
-            place = out or FOLDER / "problems.json"
+            found, place = _compared(_problems_alone({**folders}), True, progress), out or FOLDER / "problems.json"
+            lines = _problem_lines(found)
         else:
-            study = study_all("full" if full else "quick", problems or (), progress=progress)
-            found = finding_of_study(study)
-            lines, place = _study_lines(found, study.problems), out or FOLDER / "complementarity.json"
+            found, place = _compared(complementarity(folders), full, progress), out or FOLDER / "complementarity.json"
+            lines = _study_lines(found)
     _keep(found, place, figure)
     if json_:
         print_json(plain_finding(found))
@@ -119,13 +116,13 @@ def _export(folder: Path) -> int:
     return len(problems)
 
 
-def _problems_alone(folders: Iterable[Path], progress: Any) -> tuple[Finding, list[str]]:
-    failures: list[Failure] = []
-    studies = [study_problems(folder, progress=progress, failures=failures) for folder in folders]
-    parts = [part for study in studies for part in problem_parts(study)]
-    tables = {study.folder: problems_table(study) for study in studies}
-    found = finding_of("problems", "Solvers on problem files", "", "", parts, tables, failures)
-    return found, [line for study in studies for line in _problem_lines(study)]
+def _problems_alone(folders: dict[str, Path | None]) -> Topic:
+    return Topic(key="problems", title="Solvers on problem files", question="", checks=collections(folders),
+                 says=lambda tables, parts: "")  # fmt: skip
+
+
+def _compared(topic: Topic, full: bool, progress: Any) -> Finding:
+    return topic(run_world, "full" if full else "quick", lambda done, total: progress(topic.title, done, total))
 
 
 def _keep(found: Finding, place: Path, figure: str) -> None:
@@ -207,14 +204,14 @@ def _unsolved(problems: Table) -> list[str]:
     return said
 
 
-def _study_lines(found: Finding, studies: Sequence[ProblemStudy]) -> list[str]:
+def _study_lines(found: Finding) -> list[str]:
     lines: list[str] = []
     for name, keys in _SHOWN.items():
         if name in found.tables:
             lines += [sentence(found.tables[name].note) or name, *table_lines(found.tables[name].select(keys)), ""]
     if "time per impact" in found.tables:
         lines += ["Time per impact [µs], median", *table_lines(_costs(found.tables["time per impact"]), keys=2), ""]
-    return lines + [line for study in studies for line in _problem_lines(study)]
+    return lines + _problem_lines(found)
 
 
 def _costs(table: Table) -> Table:
@@ -230,19 +227,26 @@ def _costs(table: Table) -> Table:
                   [(*key, *(cells[key].get(solver) for solver in solvers)) for key in sorted(cells)])
 
 
-def _problem_lines(study: ProblemStudy) -> list[str]:
-    """Return the problems, each with the names of the solvers that did not solve it, and the profile of times."""
-    rows: list[tuple[Any, ...]] = []
-    for line in study.lines:
-        others = [f"{name} {found}" for name, found in line.verdicts if found in ("refused", "failed")]
-        solved = sum(found == "solved" for _, found in line.verdicts)
-        rows.append((line.problem, line.unknowns, line.rank, solved, ", ".join(others) or None))
-    rows += [(file.file, None, None, None, f"not read: {file.reason}") for file in study.unread]
-    by_problem = titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows)
-    shown = [1.0, 3.0, 10.0, 100.0, 1e5]
-    at = [int(np.searchsorted(FACTORS, factor, side="right")) - 1 for factor in shown]
-    profile = titled(("solver", "kind", *(f"within {factor:g}" for factor in shown)),
-                     [(solver, kind, *(f"{100 * float(share[k]):.0f} %" for k in at))
-                      for kind, solver, share in study.profile])  # fmt: skip
-    return [f"{study.folder}: every solver on every problem", *table_lines(by_problem), "",
-            "Performance profile (Dolan and Moré): solved within a factor of the fastest", *table_lines(profile), ""]
+def _problem_lines(found: Finding) -> list[str]:
+    """Return the problems, each with the names of the solvers that did not solve it, and the profiles of times."""
+    lines = []
+    for folder in (name for name, table in found.tables.items() if "why not read" in table.keys):
+        rows: list[tuple[Any, ...]] = []
+        for row in found.tables[folder].records():
+            others = ", ".join(f"{name} {said}" for name, said in row.items() if said in ("refused", "failed"))
+            why = f"not read: {row['why not read']}" if row["why not read"] else others or None
+            solved = None if row["why not read"] else sum(said == "solved" for said in row.values())
+            rows.append((row["problem"], row.get("unknowns"), row.get("rank"), solved, why))
+        by_problem = titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows)
+        profile, shown = found.tables["profile"].where(collection=folder), (1.0, 3.0, 10.0, 100.0, 1e5)
+        shares: dict[tuple[str, str], list[float]] = {}
+        for row in profile.records():
+            within = shares.setdefault((row["solver"], row["kind"]), [0.0] * len(shown))
+            for k, factor in enumerate(shown):
+                within[k] = row["share solved"] if row["factor"] <= factor * (1 + 1e-9) else within[k]
+        by_factor = titled(("solver", "kind", *(f"within {factor:g}" for factor in shown)),
+                           [(*key, *(f"{100 * share:.0f} %" for share in within)) for key, within in shares.items()])
+        lines += [f"{folder}: every solver on every problem", *table_lines(by_problem), "",
+                  "Performance profile (Dolan and Moré): solved within a factor of the fastest",
+                  *table_lines(by_factor), ""]  # fmt: skip
+    return lines

@@ -15,7 +15,7 @@ TOPICS: dict[str, str] = {
     "mechanics": "verification.mechanics.mechanics:mechanics",
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
     "stability": "verification.stability.topic:contact_stability",
-    "complementarity": "verification.complementarity.complementarity:complementarity",
+    "complementarity": "verification.complementarity.topic:TOPIC",
     "engines": "verification.engines:engines",
     "haptic-rate": "verification.cost.study:compute",
     "survival": "reports.evidence.survival:compute",

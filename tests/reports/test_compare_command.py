@@ -77,7 +77,7 @@ def test_problem_files_are_listed_with_who_did_not_solve_them_and_stored(iapb, t
     assert int(rows["two.lcp"][2]) > 3 and rows["none.lcp"][2] == "0" and rows["bad.lcp"][3:5] == ["not", "read:"]
     assert "Stored in out/compare/problems.json" in out
     tables = json.loads(Path("out/compare/problems.json").read_text(encoding="utf-8"))["tables"]
-    assert set(tables) == {"given"} and tables["given"]["rows"][0][0] == "none.lcp"
+    assert set(tables) == {"given", "profile"} and tables["given"]["rows"][0][0] == "none.lcp"
 
 
 @pytest.mark.parametrize(

@@ -20,17 +20,13 @@ from verification.table import Row, Table
 FRESH_SIZES = 15  # number of sizes drawn to confirm a region
 
 
-def _tried(table: Table) -> Iterator[Row]:
-    return (dict(zip(table.titles, row, strict=True)) for row in table.rows)
-
-
 def _fresh_sizes(study: Study, region: Region) -> Iterator[Row]:
     """Yield the rows of fresh sizes inside a region."""
     rng = np.random.default_rng(study.seed)
     ends = (region.ends("coordinates", COORDINATES), region.ends("contacts", CONTACTS))
     for _ in range(FRESH_SIZES):
         d, c = (round(low * (high / low) ** rng.random()) for low, high in ends)
-        yield from _tried(haptic_rate((d,), (c,)))
+        yield from haptic_rate((d,), (c,)).by_title()
 
 
 def _rate_says(table: Table) -> str:
@@ -47,7 +43,7 @@ C19 = Check(
     "thirds of d coordinates. Methods: the printed formula (21) in numpy, and its factored form, compiled. Once a size "
     "is too slow, larger sizes are not tried. Times are CPU times of the thread on this machine.",
     tolerance="At most one call in a thousand is late. A size that fails is tried three times.",
-    cases=lambda study: _tried(haptic_rate()), row=lambda study, row: row, draw=_fresh_sizes, says=_rate_says,
+    cases=lambda study: haptic_rate().by_title(), row=lambda study, row: row, draw=_fresh_sizes, says=_rate_says,
     holds=lambda row: bool(row["late calls"] <= ALLOWED), parts=["method"],
     conditions=["method", "coordinates", "contacts"], timed=["late calls", "time"], timed_rows=True,
     axes=("contacts", "coordinates", "method"),

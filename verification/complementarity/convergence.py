@@ -10,7 +10,6 @@ TRUTH_SCENES are small scenes in space that have an event-driven solution; only 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +21,9 @@ from iapb.simulation import simulate
 from reference.scene_events import SceneTruth, scene_truth
 from reference.time_stepping import RigidConstraints
 from reference.worlds import find_world
+from verification.check import Check
+from verification.finding import verdict_of_trials
+from verification.table import HOLDS, Table
 
 COARSE, FINE = (470.0, 500.0, 530.0), (1880.0, 2000.0, 2120.0)  # rates [Hz]; a factor of four between the levels
 _LEVELS = 4.0
@@ -76,78 +78,36 @@ WITHOUT_TRUTH = {
 }
 
 
-@dataclass(frozen=True)
-class ConvergenceRow:
-    """One scene and scheme: the largest error per step on each level, and the order between the two levels.
+def converge(case: TruthCase, law: Any = None) -> list[dict[str, Any]]:
+    """Return the row of each level on one case; `law` replaces the contact law of the rigid world.
 
-    position_coarse, position_fine : sup norm over time and coordinates, per second of step [m/s, rad/s]
-    velocity_coarse, velocity_fine : L¹ norm over time, largest over the coordinates, per second of step
-    truth_error : bounds of the truth's own errors, for positions [m, rad] and for velocities [m, rad]
+    A row has the largest errors of three steps, positions in the sup norm over time and coordinates, velocities in the
+    L¹ norm over time, largest over the coordinates. The outcome, in the row of the fine level, is whether the errors
+    divided by the step stay bounded. An order is None if the errors are rounding alone.
     """
-
-    scene: str
-    scheme: str
-    coupled: bool
-    duration: float
-    events: int
-    position_coarse: float
-    position_fine: float
-    velocity_coarse: float
-    velocity_fine: float
-    truth_error: tuple[float, float] = (np.nan, np.nan)
-
-    @property
-    def position_order(self) -> float:
-        """log₄ of the ratio of the largest position errors; infinite if these are rounding alone."""
-        return _order(self.position_coarse, self.position_fine)
-
-    @property
-    def velocity_order(self) -> float:
-        """log₄ of the ratio of the largest velocity errors; infinite if these are rounding alone."""
-        return _order(self.velocity_coarse, self.velocity_fine)
-
-    @property
-    def first_order(self) -> bool:
-        """Whether the errors per step stay bounded."""
-        return _bounded(self.position_coarse, self.position_fine) and _bounded(self.velocity_coarse, self.velocity_fine)
-
-
-def _order(coarse: float, fine: float) -> float:
-    return float(1.0 + np.log(coarse / fine) / np.log(_LEVELS)) if min(coarse, fine) > _ROUNDING else np.inf
-
-
-def _bounded(coarse: float, fine: float) -> bool:
-    return fine <= max(BOUNDED * coarse, _ROUNDING)
-
-
-def convergence(
-    cases: Sequence[TruthCase] = CASES, scheme: str = "automatic",
-    progress: Callable[[str, int, int], None] | None = None,
-) -> tuple[ConvergenceRow, ...]:
-    """Measure the convergence of the rigid world on each case."""
-    rows = []
-    for done, case in enumerate(cases):
-        rows.append(converge(case, scheme=scheme))
-        if progress is not None:
-            progress("convergence to event-driven truth", done + 1, len(cases))
-    return tuple(rows)
-
-
-def converge(case: TruthCase, law: Any = None, scheme: str = "automatic") -> ConvergenceRow:
-    """Measure the convergence on one case; `law` replaces the contact law of the rigid world."""
     scene = scene_of(case.scene)
-    truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints(scheme=scheme)
+    truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints()
     levels = [np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0) for level in (COARSE, FINE)]
-    (position_coarse, velocity_coarse), (position_fine, velocity_fine) = levels
-    return ConvergenceRow(
-        case.scene, scheme, case.coupled, case.duration, len(truth.events), float(position_coarse),
-        float(position_fine), float(velocity_coarse), float(velocity_fine),
-        _worth(case, truth, position_fine, velocity_fine),
-    )  # fmt: skip
+    _require_worth(case, truth, *levels[1])
+    (position, velocity), rows = zip(*levels, strict=True), []
+    for rates, errors in zip((COARSE, FINE), levels, strict=True):
+        step = len(rates) / sum(rates)
+        rows.append({
+            "scene": case.scene, "events": len(truth.events), "step [ms]": 1e3 * step,
+            "error of positions": float(errors[0]) * step, "error of velocities": float(errors[1]) * step,
+            "order, positions": _order(*position), "order, velocities": _order(*velocity), HOLDS: None,
+        })  # fmt: skip
+    rows[1][HOLDS] = all(fine <= max(BOUNDED * coarse, _ROUNDING) for coarse, fine in (position, velocity))
+    return rows
 
 
-def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float) -> tuple[float, float]:
-    """Return bounds of the truth's errors in the same norms; raise SolverError if they are too large to compare."""
+def _order(coarse: float, fine: float) -> float | None:
+    """Return log₄ of the ratio of the largest errors, plus one because they are errors divided by the step."""
+    return float(1.0 + np.log(coarse / fine) / np.log(_LEVELS)) if min(coarse, fine) > _ROUNDING else None
+
+
+def _require_worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float) -> None:
+    """Raise SolverError if the bounds of the truth's errors, in the same norms, are too large to compare with."""
     bound, last = truth.bound, min(1.0 / rate for rate in FINE)
     _, v = truth.state(np.linspace(0.0, truth.end, 101))
     jumps = 2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)  # L¹ error of late or early jumps
@@ -156,7 +116,6 @@ def _worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float)
         if error > max(WORTH * measured, _ROUNDING) * last:
             raise SolverError(f"{case.scene}: no reference: its error is {error:.1e}, "
                               f"that of the steps {measured * last:.1e}")
-    return worth
 
 
 def scene_of(name: str) -> Scene:
@@ -220,3 +179,29 @@ TRUTH_SCENES = {
     "cradle_in_space": _CRADLE,
     "arm_meets_a_wall_in_space": _SWINGING_ARM,
 }
+
+QUICK = ("two_discs", "bernoulli_balls", "two_link_arm_a", "peg_corner", "peg_hole", "arm_pushing",
+         "ball_dropped_in_space")  # the scenes of the quick depth
+
+
+def _says(table: Table) -> str:
+    scenes = dict.fromkeys(table.column("scene"))
+    apart = [row["scene"] for row in table.that(False).records()]
+    orders = [order for name in ("positions", "velocities") for order in table.column(f"order, {name}")
+              if order is not None]  # fmt: skip
+    more = f" ({len(CASES) - len(scenes)} more with --full)" if len(scenes) < len(CASES) else ""
+    return (
+        f"The ideal world converges to the event-driven solution at first order "
+        f"{'not on ' + ', '.join(apart) if apart else 'on all'} of {len(scenes)} scenes{more}: measured orders "
+        f"{min(orders):.2f} to {max(orders):.2f}, median {np.median(orders):.2f} (positions in the sup norm, "
+        f"velocities in L¹). No event-driven solution exists for {', '.join(WITHOUT_TRUTH)}."
+    )
+
+
+CONVERGENCE = Check(
+    key="convergence", question="The ideal world converges to the event-driven solution at first order.",
+    cases=lambda study: [case for case in CASES if study.depth == "full" or case.scene in QUICK],
+    row=lambda study, case: converge(case), says=_says, rule=verdict_of_trials, digits=3,
+    note="Each row shows the largest error of three steps near the one given; positions in the sup norm [m, rad], "
+    "velocities in L¹ over time [m, rad]. A dash: the error is rounding alone.",
+)  # fmt: skip

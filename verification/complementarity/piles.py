@@ -10,10 +10,11 @@ whether the laws agree does not depend on e (statement 2).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from functools import partial
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +23,12 @@ from iapb.errors import SolverError
 from reference.complementarity.laws import newton_lcp, nonnegative_impulse
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import DatasetError, problem_files, read_problem
+from verification.check import Check, Study
 from verification.clock import timed
-from verification.complementarity.agreement import REPRODUCED
-from verification.finding import Failure, attempt
-from verification.impacts import Floats, ImpactCase
+from verification.complementarity.agreement import PUSHED
+from verification.finding import Part, verdict_of_share
+from verification.impacts import ImpactCase
+from verification.table import Row, Table
 
 SPHERES = {"quick": (4, 8, 16, 32, 64), "full": (4, 8, 16, 32, 64, 128, 256)}
 KEPT = (0.5, 0.75, 1.0)  # shares of the lattice's contacts
@@ -35,38 +38,6 @@ LARGEST = {"quick": 200, "full": 600}  # largest number of contacts of a recorde
 LEAST_RECORDED = 20  # least number of contacts of a recorded pile
 PULLS = 1e-12  # share of the largest impulse below which a negative impulse is rounding
 _LATTICE = np.array([[1.0, 0.0, 0.0], [0.5, np.sqrt(3.0) / 2.0, 0.0], [0.5, np.sqrt(3.0) / 6.0, np.sqrt(2.0 / 3.0)]])
-
-
-@dataclass(frozen=True)
-class PileRow:
-    """One pile, resolved by (21) and by impulses that only push; distances in the kinetic metric, relative to |v⁻|.
-
-    name : name of the pile's group in the table; rows : "approaching" or "touching", the contacts that have a row
-    redundant : number of contacts minus their rank; distance : distance of the two velocities
-    pulling : share of the least-norm impulses that pull; pulling_share : their sum divided by the sum of all |p|
-    asked : whether non-negative least squares finds a p >= 0 for the velocity of (21); None if it was not used
-    lcp : distance of the velocity with pushing impulses from the reference's Newton LCP
-    gain : change of energy with pushing impulses, divided by KE⁻
-    equality, pushing : time of one impact [s], by (21) and with pushing impulses
-    """
-
-    name: str
-    rows: str
-    contacts: int
-    redundant: int
-    distance: float
-    pulling: float
-    pulling_share: float
-    asked: bool | None
-    lcp: float
-    gain: float
-    equality: float
-    pushing: float
-
-    @property
-    def agrees(self) -> bool:
-        """Whether some p >= 0 gives the velocity of (21)."""
-        return self.distance <= REPRODUCED
 
 
 def sphere_pile(spheres: int, kept: float, rng: np.random.Generator) -> ImpactCase:
@@ -107,23 +78,38 @@ def recorded_piles(folder: Path | str, largest: int) -> Iterator[ImpactCase]:
             continue
 
 
-def compare_piles(
-    depth: str = "quick", folders: Iterable[Path | str] = (), spheres: Sequence[int] | None = None, seed: int = 19,
-    failures: list[Failure] | None = None,
-) -> tuple[PileRow, ...]:
-    """Resolve our own piles and the recorded piles of some folders, by (21) and by impulses that only push."""
-    cases = [sphere_pile(n, kept, np.random.default_rng([seed, n, round(100 * kept), k]))
-             for n in spheres or SPHERES[depth] for kept in KEPT for k in range(max(1, DRAWN[depth] // n))]  # fmt: skip
-    cases += [case for folder in folders for case in recorded_piles(folder, LARGEST[depth])]
-    found = []
-    for number, case in enumerate(cases):
-        for rows in ("approaching", "touching"):
-            found.append(attempt(f"pile {number}: {case.family}, {rows}", partial(compare_pile, case, rows), failures))
-    return tuple(row for row in found if row is not None)
+def groups_of(depth: str, folders: Iterable[Path | str], seed: int = 19) -> Iterator[tuple[str, list[ImpactCase]]]:
+    """Yield our own piles, one group for each size and share of the contacts, and each recorded pile of the folders."""
+    for spheres, kept in product(SPHERES[depth], KEPT):
+        seeds = ([seed, spheres, round(100 * kept), k] for k in range(max(1, DRAWN[depth] // spheres)))
+        piles = [sphere_pile(spheres, kept, np.random.default_rng(each)) for each in seeds]
+        yield piles[0].family, piles
+    for folder in folders:
+        yield from ((case.family, [case]) for case in recorded_piles(folder, LARGEST[depth]))
 
 
-def compare_pile(case: ImpactCase, rows: str = "approaching") -> PileRow:
-    """Resolve one pile by (21) and by impulses that only push."""
+def group_rows(study: Study, group: tuple[str, list[ImpactCase]]) -> Iterator[Row]:
+    """Yield a row for the approaching and one for the touching contacts of a group of piles."""
+    for rows in ("approaching", "touching"):
+        found = [compare_pile(case, rows) for case in group[1]]
+        value = {name: [one[name] for one in found] for name in found[0]}
+        yield {
+            "pile": group[0], "rows": rows, "piles": len(found),
+            **{name: float(np.mean(value[name])) for name in ("contacts", "redundant", "share that agrees")},
+            "most contacts that agree": max((one["contacts"] for one in found if one["share that agrees"]), default=0),
+            **{name: float(np.mean(value[name])) for name in ("share of impulses that pull", "negative share of p")},
+            "median distance from the LCP": float(np.median(value["distance"])),
+            "pushing from the LCP": max(value["pushing from the LCP"]),
+            **{name: 1e6 * float(np.median(value[name])) for name in TIMES},
+            "contradicted by least squares": sum(value["contradicted"]), "largest change of KE": max(value["gain"]),
+        }  # fmt: skip
+
+
+def compare_pile(case: ImpactCase, rows: str = "approaching") -> dict[str, Any]:
+    """Resolve one pile by (21) and by impulses that only push; times in seconds.
+
+    It agrees if some p >= 0 gives the velocity of (21). Non-negative least squares contradicts this, where it is asked.
+    """
     mass, v = case.mass_matrix, case.velocity
     given = case.contact_jacobian[case.contact_jacobian @ v < 0.0] if rows == "approaching" else case.contact_jacobian
     equal, equality = timed(partial(resolve_impact, mass, given, v, 0.0))
@@ -131,17 +117,49 @@ def compare_pile(case: ImpactCase, rows: str = "approaching") -> PileRow:
     kinetic = np.linalg.cholesky(mass).T
     speed, p = float(np.linalg.norm(kinetic @ v)), equal.impulses
     law = newton_lcp(ImpactProblem.from_impact(mass, given, v, 0.0)).velocity
-    asked = len(given) <= 4 * ASKED and len(v) <= 3 * ASKED
-    return PileRow(
-        case.family, rows, len(given), len(given) - equal.rank,
-        distance=_length(kinetic, equal.velocity - push.velocity) / speed,
-        pulling=float(np.mean(p < -PULLS * np.abs(p).max(initial=0.0))) if len(p) else 0.0,
-        pulling_share=float(-p[p < 0.0].sum() / (np.abs(p).sum() or 1.0)),
-        asked=nonnegative_impulse(given, equal.generalized_impulse, mass).exists if asked else None,
-        lcp=_length(kinetic, push.velocity - law) / speed, gain=push.energy_change / (0.5 * speed**2),
-        equality=equality, pushing=pushing,
+    distance = float(np.linalg.norm(kinetic @ (equal.velocity - push.velocity))) / speed
+    agrees, asked = distance <= PUSHED, len(given) <= 4 * ASKED and len(v) <= 3 * ASKED
+    return {
+        "contacts": len(given), "redundant": len(given) - equal.rank, "share that agrees": agrees,
+        "distance": distance, "share of impulses that pull":
+        float(np.mean(p < -PULLS * np.abs(p).max(initial=0.0))) if len(p) else 0.0,
+        "negative share of p": float(-p[p < 0.0].sum() / (np.abs(p).sum() or 1.0)),
+        "pushing from the LCP": float(np.linalg.norm(kinetic @ (push.velocity - law))) / speed,
+        "gain": push.energy_change / (0.5 * speed**2),
+        "contradicted": asked and nonnegative_impulse(given, equal.generalized_impulse, mass).exists != agrees,
+        **dict(zip(TIMES, (equality, pushing), strict=True)),
+    }  # fmt: skip
+
+
+TIMES = ("time of (21) [µs]", "time of pushing [µs]")
+
+
+def _says(table: Table) -> Part:
+    rows = table.records()
+    piles = sum(row["piles"] for row in rows)
+    agree = sum(row["piles"] * row["share that agrees"] for row in rows)
+    limit = max(row["most contacts that agree"] for row in rows)
+    beyond = [row for row in rows if row["contacts"] > limit] or rows
+    pulling = 100.0 * float(np.average([row["share of impulses that pull"] for row in beyond],
+                                       weights=[row["piles"] for row in beyond]))  # fmt: skip
+    return Part(
+        "Dense piles, with every colliding contact as an equality: some p >= 0 gives the velocity of (21) in "
+        f"{agree:.0f} of {piles} impacts, and in none with more than {limit} contacts. Do not use (19) where more than "
+        f"{limit} contacts collide at once: there {pulling:.0f} % of the impulses pull. With impulses that only push "
+        "(method \"poisson\", world IAPB-push) the velocity equals the LCP's to "
+        f"{max(row['pushing from the LCP'] for row in rows):.0e}, and the energy changes by at most "
+        f"{max(row['largest change of KE'] for row in rows):.0e} KE⁻. Non-negative least squares contradicts this in "
+        f"{sum(row['contradicted by least squares'] for row in rows)} impacts.",
+        verdict_of_share(agree / piles), "piles",
+        miss=f"beyond {limit} contacts at once {pulling:.0f} % of IAPB's impulses pull")  # fmt: skip
+
+
+def piles(folders: Iterable[Path | str]) -> Check:
+    """Return the check on our own piles and on the recorded piles of some folders."""
+    return Check(
+        key="piles", question="", cases=lambda study: groups_of(study.depth, folders), row=group_rows, says=_says,
+        timed=TIMES, digits=3,
+        note="(21) with every row as an equality, beside impulses that only push (method \"poisson\"); e = 0; "
+        "distances in the kinetic metric, relative to |v⁻|. Agrees: some p >= 0 gives the velocity of (21). Times are "
+        "of calls from Python, checks included.",
     )  # fmt: skip
-
-
-def _length(kinetic: Floats, change: Floats) -> float:
-    return float(np.linalg.norm(kinetic @ change))

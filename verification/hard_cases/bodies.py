@@ -17,8 +17,7 @@ from verification.impacts import cradle_rows
 def touching_cradle_impact() -> HardCase:
     """Five equal balls that touch in a row; all four contacts are in one impact."""
     return HardCase(
-        "Newton's cradle, all contacts at once",
-        "textbook; paper (12) with assumption (i)",
+        "Newton's cradle, all contacts at once", "textbook; paper (12) with assumption (i)",
         "three contacts do not approach; as equalities their relative velocities stay zero",
         "the first ball returns with 3/5, the other four leave together with 2/5",
         np.eye(5), cradle_rows(5), np.array([1.0, 0.0, 0.0, 0.0, 0.0]), 1.0,
@@ -44,8 +43,7 @@ def rocking_block() -> HardCase:
     inertia = (half**2 + high**2) / 3.0
     turning = np.array([-high, half, 1.0])  # rotation about the corner at (−half, −high) at 1 rad/s
     return HardCase(
-        "Rocking block, one rock",
-        "Housner, Bull. Seismological Society of America 53 (1963)",
+        "Rocking block, one rock", "Housner, Bull. Seismological Society of America 53 (1963)",
         "the struck corner stops in both directions and the other corner lifts off; the geometry alone determines the "
         "energy loss",
         "angular momentum about the struck corner is conserved: ω⁺ = ω⁻ (1 − 3/2 sin² α), α the block's slenderness",
@@ -57,8 +55,7 @@ def superball() -> HardCase:
     """A ball of radius 1/8 whose contact point reverses its velocity along and across the wall."""
     radius = 0.125
     return HardCase(
-        "Superball with grip",
-        "Garwin, American J. of Physics 37 (1969)",
+        "Superball with grip", "Garwin, American J. of Physics 37 (1969)",
         "the tangential row is elastic as well: spin and sliding exchange energy without loss",
         "both velocity components of the contact point are reversed, energy is conserved",
         np.diag([1.0, 1.0, 0.4 * radius**2]), np.array([[0.0, 1.0, 0.0], [1.0, 0.0, radius]]),
@@ -84,8 +81,7 @@ def wedge() -> HardCase:
     n, t = Fraction(m * m - 1, m * m + 1), Fraction(2 * m, m * m + 1)
     exact = np.array([[n, t], [-n, t]], dtype=object)
     return HardCase(
-        "Wedging between walls 4e-6 apart in angle",
-        "a wedge: friction cones and normals nearly opposite",
+        "Wedging between walls 4e-6 apart in angle", "a wedge: friction cones and normals nearly opposite",
         "the rows are nearly opposite: the net impulse is a millionth of the contact impulses",
         "both approach speeds are reversed, to an error of ε divided by the angle",
         np.eye(2), exact.astype(float), np.array([0.5, -1.0]), 0.5, exact_jacobian=exact,
@@ -96,8 +92,7 @@ def painleve_impact() -> FrictionalCase:
     """Painlevé's rod: its lower end strikes the floor while sliding, with μ = 2."""
     sine, cosine = 0.8, 0.6
     return FrictionalCase(
-        "Painlevé's rod, its impact",
-        "Painlevé (1895); Génot and Brogliato (1999)",
+        "Painlevé's rod, its impact", "Painlevé (1895); Génot and Brogliato (1999)",
         "sliding friction presses the end into the floor more than it slows it: the slip stops during the impact",
         "restitution met, no energy gain: the tangential impulse is limited by sticking and by the energy lost in the "
         "impact",
@@ -131,8 +126,7 @@ def rolling_coin() -> HardCase:
     mass = np.diag([100.0] * 6)
     mass[3:, 3:] = [[41.0, 0.0, 12.0], [0.0, 25.0, 0.0], [12.0, 0.0, 34.0]]  # 25 (1 + a aᵀ), a = (4/5, 0, 3/5)
     return HardCase(
-        "Coin that starts to roll",
-        "Appell, Traité de mécanique rationnelle (1900); numbers ours",
+        "Coin that starts to roll", "Appell, Traité de mécanique rationnelle (1900); numbers ours",
         "a full inertia matrix couples sliding, falling and spin: sticking changes the axis of the spin",
         "it rolls: the contact point of the rim is at rest, and angular momentum about that point is conserved",
         mass, exact.astype(float), np.array([0.0, 2.0, -1.0, -4.0, 0.0, -3.0]), 0.0, exact_jacobian=exact,

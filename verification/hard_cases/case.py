@@ -125,7 +125,7 @@ class FrictionalCase(HardCase):
 
     def newton_with_coulomb(self) -> tuple[Fraction, ...]:
         """Return v⁺ by Kane and Levinson's equations, without reduced friction."""
-        return self.impact.velocity(Fraction(1))
+        return self.impact.velocity(1)
 
 
 @dataclass(frozen=True)

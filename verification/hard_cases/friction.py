@@ -48,11 +48,8 @@ def double_pendulum_without_friction() -> HardCase:
         _SOURCE,
         "the motions of the two rods are coupled: the effective mass of the tip is a fifth of a rod's",
         "½ (1 − e²) γ²/W is lost, as Theorem 1 says",
-        _MASS,
-        _NORMAL,
-        _VELOCITY,
-        _RESTITUTION,
-    )
+        _MASS, _NORMAL, _VELOCITY, _RESTITUTION,
+    )  # fmt: skip
 
 
 def double_pendulum_with_friction() -> HardCase:
@@ -62,14 +59,9 @@ def double_pendulum_with_friction() -> HardCase:
         _SOURCE,
         "friction reverses the slip: with Newton's and Coulomb's laws unchanged the energy triples",
         "restitution is met and no energy is gained: friction is reduced until it creates none",
-        _MASS,
-        _NORMAL,
-        _VELOCITY,
-        _RESTITUTION,
-        methods=("factored", NEWTON_COULOMB),
-        tangent=_TANGENT,
+        _MASS, _NORMAL, _VELOCITY, _RESTITUTION, methods=("factored", NEWTON_COULOMB), tangent=_TANGENT,
         friction=_FRICTION,
-    )
+    )  # fmt: skip
 
 
 _SCENE = f"""
@@ -80,32 +72,14 @@ rate: 2000
 duration: 0.5
 gravity: [0, -{_G}]
 bodies:
-  - name: upper
-    joint: revolute
-    mass: 1.0
-    center_of_mass: [0.5, 0]
-    inertia: 0.08333333333333333
-    position: [{math.atan2(5, 12) - math.pi / 2!r}]
-  - name: lower
-    parent: upper
-    joint: revolute
-    origin: [1, 0]
-    mass: 1.0
-    center_of_mass: [0.5, 0]
-    inertia: 0.08333333333333333
-    shapes:
-      - {{kind: circle, radius: 1.0e-6, center: [1, 0]}}
-    position: [{math.atan2(8, 15) - math.atan2(5, 12)!r}]
-    velocity: [-0.1]
-walls:
-  - {{name: floor, kind: half_plane, point: [0, {_FLOOR!r}], normal: [0, 1]}}
-contact:
-  forces: paper
-  restitution: {_RESTITUTION}
-  friction: {_FRICTION}
-  stiffness: 1e4
-  damping: 100
-  coherence_distance: 1e-2
+  - {{name: upper, joint: revolute, mass: 1.0, center_of_mass: [0.5, 0], inertia: 0.08333333333333333,
+     position: [{math.atan2(5, 12) - math.pi / 2!r}]}}
+  - {{name: lower, parent: upper, joint: revolute, origin: [1, 0], mass: 1.0, center_of_mass: [0.5, 0],
+     inertia: 0.08333333333333333, shapes: [{{kind: circle, radius: 1.0e-6, center: [1, 0]}}],
+     position: [{math.atan2(8, 15) - math.atan2(5, 12)!r}], velocity: [-0.1]}}
+walls: [{{name: floor, kind: half_plane, point: [0, {_FLOOR!r}], normal: [0, 1]}}]
+contact: {{forces: paper, restitution: {_RESTITUTION}, friction: {_FRICTION}, stiffness: 1e4, damping: 100,
+          coherence_distance: 1e-2}}
 """
 
 
@@ -119,10 +93,8 @@ def double_pendulum_motion() -> TrajectoryCase:
         "guarantee this",
         "kinetic plus potential energy never exceeds that at the start; until the tip touches, the motion is that of "
         "the equations of two rods, integrated to twelve digits",
-        scene_from_text(_SCENE),
-        _measure_pendulum,
-        worlds=("IAPB", "PB", "ideal", COULOMB),
-    )
+        scene_from_text(_SCENE), _measure_pendulum, worlds=("IAPB", "PB", "ideal", COULOMB),
+    )  # fmt: skip
 
 
 def _measure_pendulum(run: Run) -> Measured:
@@ -175,14 +147,9 @@ rate: 4000
 duration: {duration}
 gravity: [0, -{g}]
 bodies:
-  - name: block
-    joint: planar
-    mass: 1.0
-    inertia: 0.0020833333333333333
-    shapes: [{{kind: box, size: [0.15, 0.05]}}]
-    position: [0, {height}, 0]
-walls:
-  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
+  - {{name: block, joint: planar, mass: 1.0, inertia: 0.0020833333333333333,
+     shapes: [{{kind: box, size: [0.15, 0.05]}}], position: [0, {height}, 0]}}
+walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
 contact: {{forces: paper, stiffness: 1e4, damping: 100, friction: {mu}, friction_law: {law},
           friction_velocity: {creep}, coherence_distance: 2e-3}}
 hand: {{body: block, point: [0, -{level}], force: [{force}, 0, 0]}}
@@ -261,22 +228,12 @@ rate: 4000
 duration: 0.1
 gravity: [0, -{_G}]
 bodies:
-  - name: rod
-    joint: planar
-    mass: 1.0
-    inertia: 0.08333333333333333
-    shapes: [{{kind: circle, radius: 1.0e-6, center: [-0.5, 0]}}]
-    position: [0, {_HEIGHT!r}, {math.atan2(_SINE, _COSINE)!r}]
-    velocity: [-{_SPEED}, 0, 0]
-walls:
-  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
-contact:
-  forces: paper
-  stiffness: {_STIFF}
-  damping: 0
-  friction: {_ROUGH}
-  friction_velocity: {_STOPPED_SLIP}
-  coherence_distance: 5e-3
+  - {{name: rod, joint: planar, mass: 1.0, inertia: 0.08333333333333333,
+     shapes: [{{kind: circle, radius: 1.0e-6, center: [-0.5, 0]}}],
+     position: [0, {_HEIGHT!r}, {math.atan2(_SINE, _COSINE)!r}], velocity: [-{_SPEED}, 0, 0]}}
+walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
+contact: {{forces: paper, stiffness: {_STIFF}, damping: 0, friction: {_ROUGH}, friction_velocity: {_STOPPED_SLIP},
+          coherence_distance: 5e-3}}
 """
 
 
@@ -289,10 +246,8 @@ def painleve_rod() -> TrajectoryCase:
         "diverge",
         "it jams: a rigid contact at once, a spring once its force has grown large enough",
         f"springs: the slip of the rod's own equations, stopped after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
-        scene_from_text(_ROD),
-        _measure_rod,
-        _WORLDS,
-    )
+        scene_from_text(_ROD), _measure_rod, _WORLDS,
+    )  # fmt: skip
 
 
 @cache
@@ -353,22 +308,11 @@ rate: 4000
 duration: {duration}
 gravity: [0, -{g}]
 bodies:
-  - name: plate
-    joint: planar
-    mass: 1.0
-    inertia: 0.001875
-    shapes: [{{kind: box, size: [0.15, {thick}]}}]
-    position: [0, {height!r}, 0]
-    velocity: [{speed}, 0, 0]
-  - name: ball
-    joint: prismatic
-    axis: [1, 0]
-    origin: [{behind!r}, {height!r}]
-    mass: 1e8
-    shapes: [{{kind: circle, radius: {thin}}}]
-    velocity: [{speed}]
-walls:
-  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
+  - {{name: plate, joint: planar, mass: 1.0, inertia: 0.001875, shapes: [{{kind: box, size: [0.15, {thick}]}}],
+     position: [0, {height!r}, 0], velocity: [{speed}, 0, 0]}}
+  - {{name: ball, joint: prismatic, axis: [1, 0], origin: [{behind!r}, {height!r}], mass: 1e8,
+     shapes: [{{kind: circle, radius: {thin}}}], velocity: [{speed}]}}
+walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
 contact: {{forces: paper, stiffness: {press}, damping: 0, friction: {mu}, coherence_distance: 2e-3}}
 """
 

@@ -16,25 +16,19 @@ def mass_ratio() -> HardCase:
         "a grain between a body and a wall; bad scaling: Higham, Accuracy and Stability (2002)",
         "κ(M) = 1e12; the light body's speed is a thousandfold the heavy one's error",
         "both bodies bounce exactly, no energy gain",
-        np.diag([1.0, 1e-12]),
-        np.array([[1.0, -1.0], [0.0, 1.0]]),
-        np.array([-1.0, -1e3]),
-        1.0,
-    )
+        np.diag([1.0, 1e-12]), np.array([[1.0, -1.0], [0.0, 1.0]]), np.array([-1.0, -1e3]), 1.0,
+    )  # fmt: skip
 
 
 def tiny_lever_arm() -> HardCase:
     """A face that strikes at two points 1e-9 m apart."""
     return HardCase(
-        "Lever arms of 1e-9 m",
-        "contact points that a detector reports at nearly the same place",
+        "Lever arms of 1e-9 m", "contact points that a detector reports at nearly the same place",
         "two rows whose difference is 1e-9: a real rotation constraint, close to noise",
         "rank 2: the rotation is stopped",
-        np.diag([1.0, 1.0, 1.0]),
-        np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 1e-9]]),
-        np.array([1.0, -1.0, 3.0]),
+        np.diag([1.0, 1.0, 1.0]), np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 1e-9]]), np.array([1.0, -1.0, 3.0]),
         0.0,
-    )
+    )  # fmt: skip
 
 
 def _arm(q1: float) -> tuple[np.ndarray, np.ndarray]:
@@ -51,17 +45,13 @@ def straight_arm() -> HardCase:
     mass, row = _arm(0.3)
     cleaned = np.where(np.abs(row) <= 1e-13 * np.array([[2.0, 1.0]]), 0.0, row)
     return HardCase(
-        "Straight arm struck along itself",
-        "a singular linkage: Nakamura and Hanafusa (1986)",
+        "Straight arm struck along itself", "a singular linkage: Nakamura and Hanafusa (1986)",
         "the exact row is zero, the computed one 1e-16: unit scaling would promote it to a contact",
         "nothing happens, since the contact set makes such a row exactly zero",
-        mass,
-        cleaned,
-        np.array([1.0, -0.5]),
-        0.0,
+        mass, cleaned, np.array([1.0, -0.5]), 0.0,
         exact_jacobian=np.array([[Fraction(0), Fraction(0)]], dtype=object),
         methods=("factored", "gram_pinv", "damped", "svd"),
-    )
+    )  # fmt: skip
 
 
 def face_at_three_points() -> HardCase:
@@ -77,13 +67,9 @@ def face_at_three_points() -> HardCase:
         "hyperstatic contact of flat faces; the triangle 3-4-5 makes the rotation exact",
         "rank 2 in exact geometry, rank 3 in doubles: a row of rounding noise would brake the sliding",
         "the tangential speed is unchanged",
-        np.diag([2.0, 2.0, 0.1]),
-        exact.astype(float),
-        np.array([2.4 + 0.6, 1.8 - 0.8, 0.0]),
-        0.5,
-        exact_jacobian=exact,
-        methods=("factored", "gram_pinv", "damped", "svd"),
-    )
+        np.diag([2.0, 2.0, 0.1]), exact.astype(float), np.array([2.4 + 0.6, 1.8 - 0.8, 0.0]), 0.5,
+        exact_jacobian=exact, methods=("factored", "gram_pinv", "damped", "svd"),
+    )  # fmt: skip
 
 
 def grazing() -> HardCase:
@@ -95,10 +81,8 @@ def grazing() -> HardCase:
         "the sliding velocity keeps all its digits; the approach velocity is reversed with an error of ε times the "
         "speed",
         np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.25], [0.0, 0.25, 3.0]]),
-        np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.5]]),
-        np.array([100.0, -1e-8, 0.0]),
-        0.7,
-    )
+        np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.5]]), np.array([100.0, -1e-8, 0.0]), 0.7,
+    )  # fmt: skip
 
 
 def subnormal_speeds() -> HardCase:
@@ -108,11 +92,8 @@ def subnormal_speeds() -> HardCase:
         "a body whose speed halves again and again; Demmel, Underflow and reliability (1984)",
         "squares underflow: energies of 1e-624 J",
         "solved as any other impact after scaling; the result is rounded to subnormal numbers",
-        np.array([[2.0, 0.5], [0.5, 1.0]]),
-        np.array([[1.0, 0.0]]),
-        np.array([-3e-312, 1e-312]),
-        0.5,
-    )
+        np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([[1.0, 0.0]]), np.array([-3e-312, 1e-312]), 0.5,
+    )  # fmt: skip
 
 
 def light_direction() -> HardCase:
@@ -128,11 +109,8 @@ def light_direction() -> HardCase:
         "backward error of Cholesky's factor: Higham, Accuracy and Stability (2002), chapter 10",
         "Cholesky's backward error d ε κ(M) is as large as the energy's fifth digit",
         "no gain above 10 d ε √κ(M), thanks to the clamp",
-        mass,
-        rows,
-        axes[:, -1],
-        1.0,
-    )
+        mass, rows, axes[:, -1], 1.0,
+    )  # fmt: skip
 
 
 def bar_with_unequal_restitution() -> HardCase:
@@ -143,12 +121,8 @@ def bar_with_unequal_restitution() -> HardCase:
         "docs/theory.md; the kind of gain of Kane and Levinson (1985)",
         "equalities with unequal e create energy: 0.5 J become 12.167 J",
         "Poisson's law by two LCPs is passive, contacts only push, and none approaches afterwards",
-        mass,
-        rows,
-        np.array([-1.0, 0.0]),
-        np.array([1.0, 0.0]),
-        methods=("factored",),
-    )
+        mass, rows, np.array([-1.0, 0.0]), np.array([1.0, 0.0]), methods=("factored",),
+    )  # fmt: skip
 
 
 def wedged_peg() -> HardCase:
@@ -164,10 +138,6 @@ def wedged_peg() -> HardCase:
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
         "six rows of rank three; the normals of the sides are nearly perpendicular to the motion, and the sides pull",
         "stopped in all three coordinates at once",
-        np.diag([2.0, 2.0, 0.005]),
-        exact.astype(float),
-        np.array([1e-4, -0.04, 1e-3]),
-        0.0,
-        exact_jacobian=exact,
-        methods=("factored", "gram_pinv", "damped", "svd"),
-    )
+        np.diag([2.0, 2.0, 0.005]), exact.astype(float), np.array([1e-4, -0.04, 1e-3]), 0.0,
+        exact_jacobian=exact, methods=("factored", "gram_pinv", "damped", "svd"),
+    )  # fmt: skip

@@ -27,29 +27,21 @@ gravity: [0, {-_GRAVITY}]
 bodies:
   - {{name: ball, joint: prismatic, axis: [0, 1], mass: 1.0, shapes: [{{kind: circle, radius: {_RADIUS}}}],
      position: [{_RADIUS + _HEIGHT}]}}
-walls:
-  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
-contact:
-  forces: paper
-  restitution: {_RESTITUTION}
-  stiffness: 1e5
-  damping: 200
-  coherence_distance: 5e-3
+walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
+contact: {{forces: paper, restitution: {_RESTITUTION}, stiffness: 1e5, damping: 200, coherence_distance: 5e-3}}
 """
 
 
 def chatter() -> TrajectoryCase:
     """A ball dropped from 0.1 m with e = ½."""
     return TrajectoryCase(
-        "Contact chatter: infinitely many bounces in 0.43 s",
-        "Zeno's bouncing ball; textbook",
+        "Contact chatter: infinitely many bounces in 0.43 s", "Zeno's bouncing ball; textbook",
         "the bounces accumulate: an event-driven method never passes that instant, and a time-stepping method may keep "
         "bouncing",
         "the parabolas as far as the time step resolves them, then rest",
         f"parabolas of heights h e²ᵏ in closed form, at rest from {_end():.4f} s on",
-        scene_from_text(_SCENE),
-        _measure_chatter,
-    )
+        scene_from_text(_SCENE), _measure_chatter,
+    )  # fmt: skip
 
 
 def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -160,9 +152,8 @@ def wedged_peg_motion() -> TrajectoryCase:
         "six gaps close in the same step; then the springs of six contacts carry the hand force",
         "at rest at the end of the hole, no deeper than six springs allow",
         "statics: 2 K δ + 4 K s² δ = F, s the sine of the draft; a rigid wall has δ = 0",
-        load_scene(find_scene("peg_hole")),
-        _measure_peg,
-    )
+        load_scene(find_scene("peg_hole")), _measure_peg,
+    )  # fmt: skip
 
 
 def _measure_peg(run: Run) -> Measured:

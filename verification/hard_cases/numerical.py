@@ -10,16 +10,12 @@ from verification.hard_cases.case import HardCase
 def thousand_copies() -> HardCase:
     """One contact reported a thousand times."""
     return HardCase(
-        "1,000 copies of one contact",
-        "collision detectors on flat faces",
+        "1,000 copies of one contact", "collision detectors on flat faces",
         "the Delassus matrix is 1000 × 1000 of rank one; p is not unique",
         "the outcome of a single contact, with every method that allows redundant rows",
-        np.array([[2.0, 0.3, 0.1], [0.3, 1.0, 0.2], [0.1, 0.2, 0.5]]),
-        np.tile([0.6, 0.8, -0.25], (1000, 1)),
-        np.array([-1.0, -2.0, 0.5]),
-        0.5,
-        methods=("factored", "gram_pinv", "damped", "svd"),
-    )
+        np.array([[2.0, 0.3, 0.1], [0.3, 1.0, 0.2], [0.1, 0.2, 0.5]]), np.tile([0.6, 0.8, -0.25], (1000, 1)),
+        np.array([-1.0, -2.0, 0.5]), 0.5, methods=("factored", "gram_pinv", "damped", "svd"),
+    )  # fmt: skip
 
 
 def no_contact() -> HardCase:
@@ -53,14 +49,10 @@ def _contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
     return HardCase(
         name,
         "meshes in contact, at the haptic rate",
-        why_hard,
-        expected,
-        np.diag([1.0, 2.0, 3.0, 4.0]),
-        rows.astype(float).reshape(count, 4),
-        np.array([-1.0, -0.5, 0.25, 2.0]),
-        0.5,
+        why_hard, expected, np.diag([1.0, 2.0, 3.0, 4.0]), rows.astype(float).reshape(count, 4),
+        np.array([-1.0, -0.5, 0.25, 2.0]), 0.5,
         methods=("factored", "gram_pinv", "gram_cholesky", "damped", "svd"),
-    )
+    )  # fmt: skip
 
 
 def nearly_parallel_normals() -> HardCase:
@@ -70,11 +62,9 @@ def nearly_parallel_normals() -> HardCase:
         "a corner of two almost coplanar faces; normal equations: Higham (2002), chapter 20; erratum 6",
         "forming J M⁻¹ Jᵀ squares the condition number to 1e12",
         "rank 2, elastic, no gain",
-        np.diag([1.0, 2.0, 3.0]),
-        np.array([[1.0, 0.5, 0.25], [1.0, 0.5 + 1e-6, 0.25]]),
-        np.array([-1.0, 2.0, 1.0]),
-        1.0,
-    )
+        np.diag([1.0, 2.0, 3.0]), np.array([[1.0, 0.5, 0.25], [1.0, 0.5 + 1e-6, 0.25]]),
+        np.array([-1.0, 2.0, 1.0]), 1.0,
+    )  # fmt: skip
 
 
 def printed_formula_gains() -> HardCase:
@@ -90,11 +80,8 @@ def printed_formula_gains() -> HardCase:
         "erratum 6 of the paper; normal equations: Higham, Accuracy and Stability (2002)",
         "W has condition 1e8 from the rows and 1e6 from M: its small singular values are noise",
         "no gain; the printed formula inverts noise",
-        0.5 * (mass + mass.T),
-        rows,
-        rng.normal(size=d),
-        1.0,
-    )
+        0.5 * (mass + mass.T), rows, rng.normal(size=d), 1.0,
+    )  # fmt: skip
 
 
 def hilbert_rows() -> HardCase:
@@ -102,16 +89,11 @@ def hilbert_rows() -> HardCase:
     n = 8
     rows = 1.0 / (np.arange(n)[:, None] + np.arange(n) + 1.0)
     return HardCase(
-        "Hilbert rows, n = 8",
-        "Hilbert (1894); the classical rank decision",
+        "Hilbert rows, n = 8", "Hilbert (1894); the classical rank decision",
         "full rank exactly, condition 1.5e10: singular values on both sides of any tolerance",
         "restitution met and no energy gain; how many of the smallest directions count is a choice",
-        np.eye(n),
-        rows,
-        np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]),
-        0.5,
-        well_posed=False,
-    )
+        np.eye(n), rows, np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]), 0.5, well_posed=False,
+    )  # fmt: skip
 
 
 def kahan_rows() -> HardCase:
@@ -124,9 +106,5 @@ def kahan_rows() -> HardCase:
         "Kahan, Numerical linear algebra (1966): rank revealed wrongly by pivoted factorizations",
         "smallest singular value far below every pivot",
         "restitution met and no energy gain",
-        np.eye(n),
-        rows,
-        np.cos(np.arange(n)),
-        0.8,
-        well_posed=False,
-    )
+        np.eye(n), rows, np.cos(np.arange(n)), 0.8, well_posed=False,
+    )  # fmt: skip

@@ -12,17 +12,20 @@ from hypothesis import strategies as st
 from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import write_fclib
+from verification.check import Study
 from verification.complementarity.agreement import (
+    MAP,
+    PUSHED,
     SAME,
-    agreement_map,
+    TWO_CONTACTS,
     compare_case,
     compare_cases,
-    contradicts,
     iapb,
-    two_contact_map,
+    map_rows,
 )
-from verification.complementarity.cases import FAMILIES, random_cases, two_contacts
-from verification.complementarity.piles import compare_piles, recorded_piles
+from verification.complementarity.families import FAMILIES, random_cases, two_contacts
+from verification.complementarity.piles import groups_of, piles, recorded_piles
+from verification.finding import REFUTED, REPRODUCED
 from verification.impacts import ImpactCase
 
 CASES = list(random_cases(6, seed=11))
@@ -30,25 +33,24 @@ FOUND = compare_cases(CASES)
 
 
 def test_one_contact_is_the_complementarity_solution() -> None:
-    single = [c for c in FOUND if c.family == "one contact"]
+    single = [c for c in FOUND if c.case.family == "one contact"]
     assert single and max(c.distance for c in single) <= 1e-12
 
 
 def test_agreement_if_and_only_if_some_pushing_impulse_gives_the_motion() -> None:
-    assert not [c for c in FOUND if contradicts(c)]
+    assert not [c for c in FOUND if c.contradicts]
     assert all(c.agrees == c.pushes for c in FOUND)
     assert {c.agrees for c in FOUND} == {True, False}  # both sides of the border were seen
 
 
 def test_distance_is_that_from_the_cone_and_costs_the_stated_energy() -> None:
-    assert max(c.projection_defect for c in FOUND) <= 1e-12
-    assert max(c.energy_defect for c in FOUND) <= 1e-12
+    assert max(c.defect for c in FOUND) <= 1e-12
     assert max(c.momentum_residual for c in FOUND) <= 1e-10
 
 
 def test_restitution_scales_the_distance_and_moves_no_border() -> None:
     """The same impacts with e = 0 and e = 1: twice the distance."""
-    by_e = {e: [c for c in FOUND if c.restitution == e] for e in (0.0, 1.0)}
+    by_e = {e: [c for c in FOUND if c.case.restitution == e] for e in (0.0, 1.0)}
     for plastic, elastic in zip(by_e[0.0], by_e[1.0], strict=True):
         assert elastic.distance == pytest.approx(2.0 * plastic.distance, rel=1e-9, abs=1e-12)
 
@@ -60,12 +62,21 @@ def test_two_contacts_agree_exactly_where_the_speed_ratio_exceeds_the_cosine(c: 
     assert compare_case(two_contacts(c, r, np.random.default_rng(seed))).agrees == (r > c)
 
 
-def test_map_counts_its_cells_and_finds_the_border_on_the_grid() -> None:
-    cells = agreement_map(FOUND)
-    assert sum(cell.cases for cell in cells) == len(FOUND)
-    assert len(FOUND) == 6 * 3 * sum(len(family.redundancies) for family in FAMILIES.values())
-    assert all(cell.contradictions == 0 for cell in cells)
-    assert all(cell.predicted == cell.found for cell in two_contact_map())
+def test_the_map_counts_all_cases_and_one_exception_refutes_it() -> None:
+    rows = list(map_rows(FOUND))
+    assert sum(row["cases"] for row in rows) == len(FOUND)
+    assert len(FOUND) == 6 * 3 * sum(len(redundancies) for _, redundancies in FAMILIES.values())
+    statements, touching = MAP.sentences(MAP.table_of(rows))
+    assert statements.verdict == REPRODUCED and touching.name == "touching"
+    for name, wrong in (("contradictions", 1), ("defect", 10 * PUSHED), ("momentum outside range(Jᵀ)", 1e-3)):
+        assert MAP.sentences(MAP.table_of([{**rows[0], name: wrong}, *rows[1:]]))[0].verdict == REFUTED
+
+
+def test_two_contacts_agree_as_predicted_on_the_grid() -> None:
+    table = TWO_CONTACTS.table(Study())
+    assert len(table.rows) == 54 and table.passed
+    (said,) = TWO_CONTACTS.sentences(table)
+    assert said.verdict == REPRODUCED and said.sentence.endswith("54 of 54 rows hold.")
 
 
 def test_a_resolver_that_clips_its_impulses_is_found_out() -> None:
@@ -78,7 +89,7 @@ def test_a_resolver_that_clips_its_impulses_is_found_out() -> None:
     adhesive = [case for case, c in zip(CASES, FOUND, strict=True) if c.adhesion == "adhesive"]
     found = compare_cases(adhesive, resolver=clipped)
     assert any(c.distance > SAME and c.adhesion == "none" for c in found)
-    assert max(c.energy_defect for c in found) > 1e-3
+    assert max(c.defect for c in found) > 1e-3
 
 
 def test_unknown_families_are_refused() -> None:
@@ -87,12 +98,18 @@ def test_unknown_families_are_refused() -> None:
 
 
 def test_piles_agree_only_where_they_are_small_and_pushing_is_the_lcp() -> None:
-    rows = compare_piles(spheres=(4, 16))
-    small, large = ([row for row in rows if row.name.startswith(f"{n} spheres")] for n in (4, 16))
-    assert any(row.agrees for row in small) and not any(row.agrees for row in large)
-    assert all(row.asked == row.agrees for row in rows)
-    assert max(row.lcp for row in rows) <= 1e-12 and max(row.gain for row in rows) <= 0.0
-    assert all(row.pulling > 0.0 for row in large) and any(row.redundant > 0 for row in large)
+    check, groups = piles(()), list(groups_of("quick", ()))
+    assert len(groups) == 15 and len(groups[0][1]) == 16
+    table = check.table(Study(), [(name, found[:3]) for name, found in groups if name.startswith(("4 ", "16 "))])
+    small, large = ([row for row in table.records() if row["pile"].startswith(f"{n} spheres")] for n in (4, 16))
+    assert any(row["share that agrees"] for row in small) and not any(row["share that agrees"] for row in large)
+    assert not any(table.column("contradicted by least squares")) and max(table.column("largest change of KE")) <= 0.0
+    assert max(table.column("pushing from the LCP")) <= 1e-12
+    assert all(row["share of impulses that pull"] > 0.0 for row in large) and any(row["redundant"] for row in large)
+    (said,) = check.sentences(table)
+    limit = max(table.column("most contacts that agree"))
+    assert said.verdict == REFUTED and f"in none with more than {limit} contacts. Do not use (19)" in said.sentence
+    assert "contradicts this in 0 impacts" in said.sentence and said.miss.startswith(f"beyond {limit} contacts")
 
 
 def test_recorded_piles_are_their_normal_rows(tmp_path: Path) -> None:

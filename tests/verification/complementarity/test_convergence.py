@@ -13,9 +13,11 @@ from iapb.scene import find_scene, load_scene, scene_names
 from iapb.system import System
 from reference.scene_events import COMPUTATIONS, scene_truth
 from reference.time_stepping import RigidConstraints
+from verification.check import Study
 from verification.complementarity import convergence
 from verification.complementarity.convergence import (
     CASES,
+    CONVERGENCE,
     TRUTH_SCENES,
     WITHOUT_TRUTH,
     TruthCase,
@@ -32,9 +34,10 @@ EVENTS = {
 
 @pytest.mark.parametrize("scene", EVENTS)
 def test_the_rigid_world_converges_at_first_order(scene: str) -> None:
-    found = converge(BY_SCENE[scene])
-    assert found.events == EVENTS[scene] and found.first_order
-    assert found.position_order > 0.6 and found.velocity_order > 0.6
+    table = CONVERGENCE.table(Study(), [BY_SCENE[scene]])
+    coarse, fine = table.records()
+    assert fine["events"] == EVENTS[scene] and table.holds == (None, True)
+    assert fine["order, positions"] > 0.6 and fine["order, velocities"] > 0.6 and coarse["step"] > 3.9 * fine["step"]
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def test_a_truth_that_is_not_known_well_enough_is_refused(monkeypatch: pytest.Mo
 
 
 def test_a_wrong_law_does_not_converge() -> None:
-    assert not converge(TruthCase("peg_corner", 0.36, True, ""), law=_Halved()).first_order
+    assert not converge(TruthCase("peg_corner", 0.36, True, ""), law=_Halved())[1]["holds"]
 
 
 def test_every_scene_of_the_project_has_a_truth_or_a_reason() -> None:

@@ -10,7 +10,7 @@ from iapb.errors import IapbError
 from iapb.scene import find_scene, load_scene
 from reference.worlds import run_world
 from verification.complementarity.agreement import compare_cases
-from verification.complementarity.scene_cases import impacts_of_run
+from verification.complementarity.of_runs import impacts_of_run
 
 
 def test_the_peg_in_the_corner_has_an_impact_that_truly_pulls() -> None:

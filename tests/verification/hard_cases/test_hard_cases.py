@@ -17,18 +17,20 @@ from verification.hard_cases import (
     HardCase,
     HardCaseVerdict,
     TrajectoryCase,
+    judge,
     judge_hard_case,
     judge_hard_cases,
-    judge_impact,
 )
 from verification.hard_cases.case import DEPENDS_ON_ROUNDING, NEWTON_COULOMB, AnyCase
-from verification.hard_cases.judge import faulty_motion, methods_for, run_in_world
-from verification.hard_cases.judge_impact import (
+from verification.hard_cases.judge import (
     WITHOUT_CLAMP,
     OutOfMemory,
     TimedOut,
     bounded_impact,
     faulty_answers,
+    faulty_motion,
+    methods_for,
+    run_in_world,
 )
 
 
@@ -88,12 +90,12 @@ def _with_a_fault(case: AnyCase, method: str, size: float) -> str:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("verification.hard_cases.judge.run_in_world", lambda *_: run)
             return judge_hard_case(case, method, lambda *_: run).verdict
-    answer = judge_impact.resolve_once(case, method)
+    answer = judge.resolve_once(case, method)
     verdicts = []
     for wrong in faulty_answers(case, answer.velocity):
         with pytest.MonkeyPatch.context() as patch:
             faulty = answer._replace(velocity=answer.velocity + size * wrong)
-            patch.setattr(judge_impact, "_answer", lambda *_, faulty=faulty: faulty)
+            patch.setattr(judge, "_answer", lambda *_, faulty=faulty: faulty)
             verdicts.append(judge_hard_case(case, method).verdict)
     return "stable" if "stable" in verdicts else verdicts[0]
 
@@ -171,7 +173,7 @@ def test_a_call_that_was_cut_is_a_verdict_and_no_number(
     def cut(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("verification.hard_cases.judge_impact.bounded_impact", cut)
+    monkeypatch.setattr("verification.hard_cases.judge.bounded_impact", cut)
     verdict = judge_hard_case(HARD_CASES["ten_thousand_contacts"](), "gram_pinv")
     assert (verdict.verdict, verdict.note) == (word, str(error))
     assert np.isnan(verdict.energy_gain) and np.isnan(verdict.seconds) and not verdict.is_stable
@@ -221,7 +223,7 @@ def test_chosen_methods_and_cases_only() -> None:
 def test_noise_of_lapack_about_the_tolerance_decides_nothing(
     monkeypatch: pytest.MonkeyPatch, residual: float, hangs: bool
 ) -> None:
-    monkeypatch.setattr(judge_impact, "_unmet", lambda *_: residual)
+    monkeypatch.setattr(judge, "_unmet", lambda *_: residual)
     case = HARD_CASES["kahan_rows"]()
-    assert (judge_impact.judge_impact(case, "gram_pinv").verdict == DEPENDS_ON_ROUNDING) is hangs
-    assert judge_impact.judge_impact(case, "factored").verdict != DEPENDS_ON_ROUNDING
+    assert (judge.judge_impact(case, "gram_pinv").verdict == DEPENDS_ON_ROUNDING) is hangs
+    assert judge.judge_impact(case, "factored").verdict != DEPENDS_ON_ROUNDING

@@ -15,8 +15,8 @@ from reference.complementarity.solution import Answer
 from reference.complementarity.solvers import SOLVERS, SolverEntry
 from reference.worlds import run_world
 from verification import compare_worlds, worlds
-from verification.complementarity import problems
-from verification.complementarity.scene_cases import problems_of_run
+from verification.complementarity import solvers as problem_files
+from verification.complementarity.of_runs import problems_of_run
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
 from verification.worlds import default_worlds
 
@@ -138,7 +138,7 @@ def test_every_solver_is_judged_on_the_impacts_by_residuals(monkeypatch):
         def chosen(problem):
             return [name for name in names if (kept[name] == "cone") == (problem.friction is not None)]
 
-        for module in (problems, benchmark):
+        for module in (problem_files, benchmark):
             monkeypatch.setattr(module, "solver_names", chosen)
         return compare_worlds(DOOR, ["IAPB"], "IAPB", impacts=2)
 

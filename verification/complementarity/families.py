@@ -8,8 +8,7 @@ contacts can pull only if the cosine of their rows is positive.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,34 +20,24 @@ from verification.impacts import ImpactCase
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Geometry:
-    """A geometry: draw(rng, redundancy) -> (M, J, v), and the possible numbers of redundant rows."""
-
-    name: str
-    says: str
-    draw: Callable[[np.random.Generator, int], tuple[Floats, Floats, Floats]]
-    redundancies: tuple[int, ...]
+Draw = Callable[[np.random.Generator, int], tuple[Floats, Floats, Floats]]  # (rng, redundancy) -> (M, J, v)
 
 
 def random_cases(
-    count: int,
-    restitutions: tuple[float, ...] = (0.0, 0.5, 1.0),
-    families: tuple[str, ...] | None = None,
-    seed: int = 4,
+    count: int, restitutions: Sequence[float] = (0.0, 0.5, 1.0), families: Sequence[str] = (), seed: int = 4
 ) -> Iterator[ImpactCase]:
     """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the same impacts."""
-    unknown = set(families or ()) - set(FAMILIES)
-    if unknown:
-        raise ArgumentError("families", sorted(unknown), one_of(min(unknown), FAMILIES, "some of "))
-    for family in FAMILIES.values() if families is None else (FAMILIES[name] for name in families):
-        for redundancy in family.redundancies:
-            rng = np.random.default_rng([seed, list(FAMILIES).index(family.name), redundancy])
-            drawn = [family.draw(rng, redundancy) for _ in range(count)]
+    for name in families or FAMILIES:
+        if name not in FAMILIES:
+            raise ArgumentError("families", name, one_of(name, FAMILIES, "some of "))
+        draw, redundancies = FAMILIES[name]
+        for redundancy in redundancies:
+            rng = np.random.default_rng([seed, list(FAMILIES).index(name), redundancy])
+            drawn = [draw(rng, redundancy) for _ in range(count)]
             for e in restitutions:
                 for mass, rows, velocity in drawn:
                     closing = rows @ velocity < 0.0
-                    yield ImpactCase(mass, rows[closing], velocity, e, family.name, touching=rows[~closing])
+                    yield ImpactCase(mass, rows[closing], velocity, e, name, touching=rows[~closing])
 
 
 def two_contacts(
@@ -81,6 +70,7 @@ def _approaching(rows: Floats, velocity: Floats) -> Floats:
 
 
 def _one_contact(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
+    """A single contact, also given several times."""
     d = int(rng.integers(1, 13))
     velocity, row = rng.normal(size=d), rng.normal(size=(1, d))
     row = _approaching(row, velocity)
@@ -156,16 +146,14 @@ def _rows_that_touch(rng: np.random.Generator, redundancy: int) -> tuple[Floats,
     return mass, np.vstack([rows, row]), velocity
 
 
-FAMILIES: dict[str, Geometry] = {
-    family.name: family
-    for family in (
-        Geometry("one contact", "a single contact, also given several times", _one_contact, (0, 1, 4)),
-        Geometry("cradle", "balls in a row, neighbours close", _cradle, (0,)),
-        Geometry("obtuse normals", "rows with cosines <= 0 in the kinetic metric", _obtuse, (0,)),
-        Geometry("face on floor", "a box lands on points of one face", _face_on_floor, (0, 1, 2, 6)),
-        Geometry("corner", "a box strikes floor and wall at once", _corner, (0, 1, 2, 6)),
-        Geometry("tight hole", "a peg strikes end and sides of a hole", _hole, (1, 3, 7)),
-        Geometry("random rows", "normals in all directions", _random_rows, (0, 1, 4)),
-        Geometry("with a neighbour", "random rows beside a contact that touches", _rows_that_touch, (0, 4)),
-    )
+# name -> the draw, and the possible numbers of redundant rows
+FAMILIES: dict[str, tuple[Draw, tuple[int, ...]]] = {
+    "one contact": (_one_contact, (0, 1, 4)),
+    "cradle": (_cradle, (0,)),
+    "obtuse normals": (_obtuse, (0,)),
+    "face on floor": (_face_on_floor, (0, 1, 2, 6)),
+    "corner": (_corner, (0, 1, 2, 6)),
+    "tight hole": (_hole, (1, 3, 7)),
+    "random rows": (_random_rows, (0, 1, 4)),
+    "with a neighbour": (_rows_that_touch, (0, 4)),
 }

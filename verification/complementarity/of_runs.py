@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb import resolve_impact
 from iapb.errors import IapbError
@@ -20,9 +19,7 @@ from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes
 from reference.complementarity.problem import ImpactProblem
 from reference.contact_rows import unit_tangents
 from reference.worlds import run_world
-from verification.impacts import ImpactCase
-
-Floats = NDArray[np.float64]
+from verification.impacts import Floats, ImpactCase
 
 # Largest difference of the rebuilt and the recorded v⁺, relative to the largest |v⁻|: only rounding differs.
 _REBUILT = 1e-9

@@ -1,0 +1,121 @@
+"""Extensions, timings, collections of problems, references: what their checks find, and that planted rows turn it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from reference.complementarity.problem import ImpactProblem
+from reference.datasets import StoredProblem, write_fclib
+from verification.check import Study
+from verification.complementarity import extensions
+from verification.complementarity.extensions import BAR, FRICTION, LAW_OF_UNEQUAL, UNEQUAL
+from verification.complementarity.solvers import (
+    FACTORS,
+    collections,
+    own_problems,
+    study_problems,
+    study_read,
+)
+from verification.complementarity.topic import REFERENCES
+from verification.cost import step_cost
+from verification.cost.calls import PRINTED
+from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, impact_cost
+from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
+
+
+def test_friction_is_coulombs_law_where_all_push_and_never_gains(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(extensions.COUNTS, "quick", 15)
+    table = FRICTION.table(Study(), [(e, mu) for e in (0.0, 1.0) for mu in (0.2, 0.8)])
+    plastic, elastic = (table.where(e=e).records() for e in (0.0, 1.0))
+    assert sum(table.column("all contacts push")) > 10 and table.passed
+    assert all(row["NCP gains"] == 0 for row in plastic)
+    assert any(row["NCP gains"] > 0 and row["friction reduced"] > 0 for row in elastic)
+    for wrong in ({"share equal to the NCP": -1}, {"largest change of KE, IAPB": 1e-9}):
+        assert FRICTION.sentences(FRICTION.table_of([plastic[0] | wrong]))[0].verdict == REFUTED
+    assert FRICTION.sentences(FRICTION.table_of(()))[0].verdict == NOT_TESTABLE
+
+
+def test_unequal_restitution_is_poissons_law_and_never_gains() -> None:
+    approaching, mixed = UNEQUAL.table(Study()).records()
+    assert max(row["distance from Poisson's law"] for row in (approaching, mixed)) <= 1e-12
+    assert max(row["largest change of KE, IAPB"] for row in (approaching, mixed)) <= 1e-12
+    assert approaching["Newton LCP"] <= 1e-12 < mixed["Newton LCP"] and approaching["equalities"] > 0.1
+
+
+def test_the_struck_bar_has_the_energies_of_the_textbook_of_this_project() -> None:
+    energies = dict(BAR.table(Study()).rows)
+    assert np.isclose(energies["newton_equality"], 73.0 / 6.0)
+    assert energies[LAW_OF_UNEQUAL] <= energies["before"] == 0.5 and np.isclose(energies["newton_lcp"], 0.5)
+
+
+def test_the_references_are_compared_scene_by_scene() -> None:
+    table = REFERENCES.table(Study(), ["peg_corner"])
+    assert table.passed and REFERENCES.sentences(table)[0].verdict == REPRODUCED
+    wrong = REFERENCES.table_of([table.by_title()[0] | {"gap [m]": 1e-9}])
+    assert wrong.passed is False and REFERENCES.sentences(wrong)[0].verdict == REFUTED
+
+
+def test_every_way_is_timed_on_every_size_and_gives_the_same_motion() -> None:
+    costs = impact_cost((1, 3), ("daqp", "lemke"), repeats=1)
+    assert set(costs.select(("impacts", "contacts", "solver")).rows) == {
+        (family, contacts, solver) for family in ("patch", "pile") for contacts in (1, 3)
+        for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, "daqp", "lemke")
+    }  # fmt: skip
+    assert set(costs.column("outcome")) == {"solved"} and min(costs.column("samples")) >= 3
+    assert all(row["least"] <= row["median"] <= row["largest"] for row in costs.records())
+
+
+def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    original = step_cost.solver_call
+
+    def wrong(case, name):  # type: ignore[no-untyped-def]
+        return (lambda: case.velocity) if name == "lemke" else original(case, name)
+
+    monkeypatch.setattr(step_cost, "solver_call", wrong)
+    patch = impact_cost((1, 2), ("daqp", "lemke"), 1, longest=0.0).where(impacts="patch")
+    assert patch.where(contacts=1, solver="lemke").column("outcome") == ["failed"]
+    assert patch.where(contacts=2, solver="daqp").column("outcome") == ["left out"]
+
+
+def test_a_folder_of_problems(tmp_path: Path) -> None:
+    """A frictional, a frictionless asymmetric and a damaged file."""
+    w = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    write_fclib(tmp_path / "one.hdf5", ImpactProblem.from_delassus(w, [-1.0, 0.2, 0.1], 0.0, 0.5))
+    (tmp_path / "skew.lcp").write_text("2  2 1  0 2  -1 -1")
+    (tmp_path / "damaged.lcp").write_text("3 1 2")
+    (tmp_path / "readme.md").write_text("not a problem")
+    told: list[tuple[str, int, int]] = []
+    found = study_problems(tmp_path, progress=lambda *state: told.append(state))
+    assert [state[1:] for state in told] == [(0, total := len(found.rows)), *((n, total) for n in range(total + 1))]
+    one, skew, damaged = found.lines
+    assert (one["problem"], skew["problem"], damaged["problem"]) == ("one.hdf5", "skew.lcp", "damaged.lcp")
+    assert skew["asymmetry of W"] > 0.1 and (skew["daqp"], skew["lemke"]) == ("refused", "solved")
+    assert damaged["daqp"] == "not read" and "size 3 with 2 numbers" in damaged["why not read"]
+    shares = [row["share solved"] for row in found.profile if (row["kind"], row["solver"]) == ("frictionless", "lemke")]
+    assert len(shares) == len(FACTORS) and np.all(np.diff(shares) >= 0.0)
+    check, profile = collections({"given": tmp_path})
+    study = Study()
+    table = check.table(study)
+    assert check.sentences(table)[0].verdict == MIXED and table.holds == (True, True, False)
+    assert len(profile.table(study).rows) == len(found.profile)
+    with pytest.raises(ArgumentError, match="folder"):
+        study_problems(tmp_path / "nowhere")
+
+
+def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fails() -> None:
+    unsolvable = ImpactProblem.from_delassus([[0.0]], [-1.0], name="unsolvable")
+    larger = ImpactProblem.from_delassus(np.eye(2), [-1.0, -1.0], name="larger")
+    lines = study_read("few", [StoredProblem(larger), StoredProblem(unsolvable)], longest=0.0).lines
+    assert {line["daqp"] for line in lines} == {"failed", "left out"} and "solved" not in lines[1].values()
+
+
+def test_own_problems_are_named_apart_and_are_of_both_kinds() -> None:
+    own = [stored.problem for stored in own_problems()]
+    assert len({problem.name for problem in own}) == len(own)
+    assert {problem.friction is None for problem in own} == {True, False}
+    hyperstatic = [p for p in own if np.linalg.matrix_rank(p.delassus, hermitian=True) < p.size]
+    assert len(hyperstatic) >= 10

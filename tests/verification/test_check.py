@@ -1,0 +1,91 @@
+"""The runner: a fault costs its row, its sentence or its table alone; columns follow from the rows; topics conclude."""
+
+import pytest
+
+from iapb.errors import ArgumentError
+from verification.check import Check, Study, Topic
+from verification.finding import (
+    MIXED,
+    NOT_COMPUTED,
+    NOT_TESTABLE,
+    REFUTED,
+    REPRODUCED,
+    Part,
+    verdict_of_trials,
+)
+
+
+def row(study, case):
+    if case == "broken":
+        raise ZeroDivisionError("planted")
+    return {"case": case, "size [m]": len(case)}
+
+
+def a_check(key="sizes", cases=("a", "bb", "broken"), **options):
+    options = {"question": "Cases are short.", "holds": lambda row: row["size"] < 3} | options
+    return Check(key=key, cases=lambda study: cases, row=row, **options)
+
+
+def concluded(*checks, says=lambda tables, parts: "All said."):
+    progress = []
+    topic = Topic(key="topic", title="Topic", question="?", checks=checks, says=says)
+    found = topic(lambda *_: None, "quick", lambda *done: progress.append(done))
+    assert progress == [(done, len(checks)) for done in range(len(checks) + 1)]
+    return found
+
+
+def test_a_case_that_raises_costs_its_row_alone():
+    found = concluded(a_check())
+    assert found.tables["sizes"].rows == (("a", 1), ("bb", 2)) and found.verdict == NOT_COMPUTED
+    assert [(one.case, one.error) for one in found.failures] == [("sizes, broken", "ZeroDivisionError")]
+    assert found.parts[0].sentence == "Cases are short. 2 of 2 rows hold." and found.parts[0].verdict == REPRODUCED
+    assert found.answer == "All said. 1 case failed."
+
+
+def test_a_sentence_or_a_check_that_raises_costs_itself_alone():
+    found = concluded(a_check(cases=("a",), says=lambda table: table.nothing), a_check("second", cases=None),
+                      a_check("third", cases=("ccc",)), says=lambda tables, parts: tables["second"])  # fmt: skip
+    assert [one.case for one in found.failures] == ["sizes, its sentence", "second, all of it", "the answer"]
+    assert {"sizes", "third"} <= set(found.tables) and "second" not in found.tables
+    assert [part.verdict for part in found.parts] == [REFUTED, NOT_COMPUTED] and found.answer == "3 cases failed."
+
+
+def test_columns_follow_from_the_rows_and_have_their_marks():
+    table = a_check(conditions=["case"], timed=["size [m]"], digits=2, note="A note.", holds=None).table_of(
+        [{"case": "a", "holds": True}, {"size [m]": 2.0, "case": "b"}])  # fmt: skip
+    case, size = table.columns
+    assert (case.condition, case.timed, size.unit, size.timed, table.digits) == (True, False, "m", True, 2)
+    assert table.note == "A note." and table.timed == ("size [m]", "holds")
+
+
+def test_a_row_may_have_its_own_outcome():
+    check = a_check(holds=None)
+    table = check.table_of([{"case": "a", "holds": True}, {"case": "b"}])
+    assert table.holds == (True, None) and table.keys == ["case"]
+    assert check.table_of([{"case": "a"}]).holds == () and check.sentences(check.table_of([{"case": "a"}])) == ()
+
+
+@pytest.mark.parametrize(("rule", "verdict"), [(None, REFUTED), (verdict_of_trials, MIXED)])
+def test_the_verdict_of_a_sentence_follows_from_the_rows(rule, verdict):
+    check = a_check(says=lambda table: "Said.", **({"rule": rule} if rule else {}))
+    (said,) = check.sentences(check.table_of([{"case": "a", "size [m]": 1}, {"case": "cccc", "size [m]": 4}]))
+    assert said.verdict == verdict and not said.timed
+    assert check.sentences(check.table_of([]))[0].verdict == NOT_TESTABLE
+
+
+def test_a_check_may_say_more_than_one_part_and_quote_quantities():
+    quoted = Part("2 of 2 hold.", REPRODUCED, quantities=(("speed targets", "2 of 2"),))
+    found = concluded(a_check(cases=("a",), says=lambda table: [Part("First.", "", "one"), quoted]),
+                      says=lambda tables, parts: Part("2 of 2.", "", quantities=parts[1].quantities))  # fmt: skip
+    assert [(part.name, part.verdict) for part in found.parts] == [("one", REPRODUCED), ("", REPRODUCED)]
+    assert found.quantities == (("speed targets", "2 of 2"),)
+
+
+def test_several_rows_of_a_case_and_shared_results():
+    calls = []
+    study = Study()
+    check = Check(key="rows", question="", cases=lambda study: (1, 2),
+                  row=lambda study, n: [{"n": study.once("sum", lambda: calls.append(n) or 5) + k} for k in range(n)])
+    assert check.table(study).rows == ((5,), (5,), (6,)) and calls == [1]
+    with pytest.raises(ArgumentError, match="depth"):
+        Study(depth="deep")

@@ -1,0 +1,265 @@
+"""Run every solver on every problem of a folder; recomputed residuals decide: solved, refused or failed.
+
+The record also lists files that cannot be read, asymmetric matrices W and solvers that are not installed. Solutions
+are compared by velocities, because the impulses of hyperstatic problems are not unique.
+
+`own_problems` makes problems for users without such a folder: the hard cases, impacts of the project's scenes,
+hyperstatic families, and patches with friction. They are the same in every call.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from iapb.errors import ArgumentError
+from reference.complementarity.benchmark import SolverRow, performance_profile, run_solvers
+from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.solution import Solution
+from reference.complementarity.solvers import SOLVERS, solver_names
+from reference.datasets import DatasetError, StoredProblem, problem_files, read_problem
+from reference.one_thread import one_thread
+from verification.check import Check, Study
+from verification.complementarity.families import random_cases
+from verification.complementarity.of_runs import scene_impacts
+from verification.cost.step_cost import patch, pile
+from verification.finding import Failure, attempt, verdict_of_trials
+from verification.hard_cases import HARD_CASES, HardCase
+from verification.impacts import Floats, ImpactCase
+from verification.table import Row
+
+VERDICTS = ("solved", "refused", "failed", "missing", "left out")
+FACTORS = np.concatenate([[1.0], np.geomspace(1.5, 1e5, 60)])  # multiples of the fastest solver's time
+LONGEST = {"quick": 0.4, "full": 60.0}  # [s] a solver that takes longer skips all larger problems
+OWN = "own problems"  # name of the collection that `own_problems` makes
+Progress = Callable[[str, int, int], None]
+
+
+class ProblemStudy(NamedTuple):
+    """A collection of problems, solved by every solver for its kind of problem.
+
+    lines : a row for each problem, with a column for each solver, and for each file that cannot be read
+    rows : one for each solver and problem, as `run_solvers` returns them
+    profile : a row for each kind of problem, solver and factor: the share of the problems that the solver solves within
+        this factor of the fastest solver's time (Dolan and Moré)
+    """
+
+    lines: tuple[Row, ...]
+    rows: tuple[SolverRow, ...]
+    profile: tuple[Row, ...]
+
+    @property
+    def solvers(self) -> tuple[str, ...]:
+        """Names of the solvers in the order of their first use."""
+        return tuple(dict.fromkeys(row.solver for row in self.rows))
+
+
+def study_problems(
+    folder: Path | str, longest: float = np.inf, progress: Progress | None = None,
+    failures: list[Failure] | None = None,
+) -> ProblemStudy:
+    """Read every problem file below `folder` and solve it with every solver for its kind of problem.
+
+    Parameters
+    ----------
+    longest : if a solver needs more time than this [s], it skips all problems with more unknowns
+    failures : receives the problems that raise an exception; if it is None, the exception propagates
+
+    Raises
+    ------
+    ArgumentError
+        If the folder does not exist.
+    """
+    read, unread = list[StoredProblem](), dict[str, str]()
+    for path in problem_files(folder):
+        try:
+            read.append(read_problem(path))
+        except DatasetError as error:
+            unread[path.name] = str(error)
+    return study_read(str(folder), read, unread, longest, progress, failures)
+
+
+def study_read(
+    name: str, problems: Sequence[StoredProblem], unread: Mapping[str, str] | None = None, longest: float = np.inf,
+    progress: Progress | None = None, failures: list[Failure] | None = None,
+) -> ProblemStudy:
+    """Solve every problem of a collection called `name`; `unread` has the reason for each file that cannot be read."""
+    pairs, say = sum(len(solver_names(stored.problem)) for stored in problems), progress or (lambda *_: None)
+    stage, begun, slow = f"problems of {name}, by every solver", itertools.count(), dict[str, float]()
+    say(stage, 0, pairs)
+    rows: list[SolverRow] = []
+    with one_thread():
+        for friction in {stored.problem.friction is not None for stored in problems}:  # imports and compiles, untimed
+            size = 3 if friction else 1
+            run_solvers([ImpactProblem.from_delassus(np.eye(size), -np.eye(size)[0], 0.0, 0.5 if friction else None)])
+        for problem in sorted((stored.problem for stored in problems), key=lambda problem: problem.size):
+            rows += attempt(problem.name, partial(
+                run_solvers, [problem], longest=longest, slow=slow,
+                progress=lambda *_: say(stage, next(begun), pairs)), failures) or []
+    say(stage, pairs, pairs)
+    names, kinds, lines = dict.fromkeys(row.solver for row in rows), dict[str, list[SolverRow]](), list[Row]()
+    for stored in problems:
+        found = [row for row in rows if row.problem == stored.problem.name]
+        kinds.setdefault("frictionless" if stored.problem.friction is None else "friction", []).extend(found)
+        line = attempt(stored.problem.name, partial(_line, stored, found, names), failures) if found else None
+        lines += [line] if line else []
+    lines += [{"problem": file, **dict.fromkeys(names, "not read"), "why not read": reason}
+              for file, reason in (unread or {}).items()]  # fmt: skip
+    profile = [{"kind": kind, "solver": solver, "factor": float(factor), "share solved": float(share)}
+               for kind, found in kinds.items() for solver, shares in performance_profile(found, FACTORS).items()
+               for factor, share in zip(FACTORS, shares, strict=True)]  # fmt: skip
+    return ProblemStudy(tuple(lines), tuple(rows), tuple(profile))
+
+
+def _line(stored: StoredProblem, rows: list[SolverRow], solvers: Mapping[str, Any]) -> Row:
+    """Return the row of a problem: its size, the verdict on each solver, the spread of the contact velocities among
+    those that solved it, and the recomputed residual of the multipliers that the file has."""
+    problem, verdicts, residual = stored.problem, {row.solver: row.verdict for row in rows}, None
+    if stored.stored_impulse is not None and problem.size:
+        residual = Solution(problem, stored.stored_impulse, "stored in the file").residuals.worst
+    rank = int(np.linalg.matrix_rank(problem.delassus, hermitian=problem.asymmetry == 0.0)) if problem.size else 0
+    return {
+        "problem": problem.name, "unknowns": problem.size, "rank": rank, "asymmetry of W": rows[0].asymmetry or None,
+        **{name: verdicts.get(name) for name in solvers},
+        "spread of velocities": max((row.spread for row in rows if row.verdict == "solved"), default=None),
+        "residual as stored": residual, "why not read": None,
+    }  # fmt: skip
+
+
+def on_problems(study: Study, name: str, folder: Path | None) -> ProblemStudy:
+    """Return the study of a folder, or of our own problems, made once."""
+    longest = LONGEST[study.depth]
+
+    def make() -> ProblemStudy:
+        if folder is None:
+            return study_read(name, own_problems(study.failures), longest=longest, failures=study.failures)
+        return study_problems(folder, longest, failures=study.failures)
+
+    return study.once(("problems", name), make)
+
+
+def collections(folders: Mapping[str, Path | None]) -> tuple[Check, ...]:
+    """Return a check for each folder by name (None: our own problems), and one with the profiles of all of them."""
+    profile = Check(
+        key="profile", question="", cases=lambda study: folders, timed=["share solved"], digits=3,
+        row=lambda study, name: [{"collection": name, **row}
+                                 for row in on_problems(study, name, folders[name]).profile],
+    )  # fmt: skip
+    return (*(_collection(name, folder) for name, folder in folders.items()), profile)
+
+
+def _collection(name: str, folder: Path | None) -> Check:
+    return Check(
+        key=name, question=f"{name[:1].upper()}{name[1:]}: some solver solves every problem, by recomputed residuals.",
+        cases=lambda study: on_problems(study, name, folder).lines, row=lambda study, line: line,
+        holds=lambda row: "solved" in row.values(), rule=verdict_of_trials, timed=["spread of velocities"], digits=2,
+        note="Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. Spread: "
+        "largest difference of contact velocities among the solvers that solved it.",
+    )  # fmt: skip
+
+
+def _solver(study: Study, name: str) -> Row:
+    takes = {"lcp": "no friction", "convex": "no friction, W symmetric semidefinite", "cone": "friction"}
+    entry = SOLVERS[name]
+    return {"solver": name, "method": entry.method, "package": entry.package, "takes": takes[entry.takes]}
+
+
+SOLVER_LIST = Check(
+    key="solvers", question="", cases=lambda study: SOLVERS, row=_solver,
+    note="Siconos is a system package and is called through the system's Python. Its time is that of its compiled "
+    "solve; the times of all others are of a call from Python.",
+)  # fmt: skip
+
+
+Maker = Callable[[str], ImpactProblem]  # name -> problem
+
+# Hard cases of the catalogue with few contacts. Cases with many contacts take the slowest solvers minutes.
+HARD = ("nearly_parallel_normals", "printed_formula_gains", "hilbert_rows", "kahan_rows", "mass_ratio",
+        "tiny_lever_arm", "face_at_three_points", "grazing", "subnormal_speeds", "light_direction",
+        "bar_with_unequal_restitution")
+HYPERSTATIC_CONTACTS = (8, 24, 64)
+SCENES = ("peg_corner", "peg_hole_space", "three_link_arm_elastic", "arm_obstacles")
+FAMILIES = ("face on floor", "corner", "tight hole", "random rows")
+FRICTIONS = (0.1, 0.5, 1.0)
+FRICTIONAL_CONTACTS = (1, 4, 12)
+_SEED = 9
+
+
+def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, ...]:
+    """Return all problems of our own, frictionless ones first; `failures` receives those that cannot be made."""
+    makers: dict[str, Maker] = {f"hard case {name}": partial(_hard_case, name) for name in HARD}
+    makers |= {f"impact of {name}": partial(_scene_impact, name) for name in SCENES}
+    makers |= dict(_hyperstatic()) | dict(_with_friction())
+    made = (attempt(name, partial(make, name), failures) for name, make in makers.items())
+    return tuple(StoredProblem(problem, format="built here") for problem in made if problem is not None)
+
+
+def _hard_case(hard: str, name: str) -> ImpactProblem:
+    case = HARD_CASES[hard]()
+    if not isinstance(case, HardCase):
+        raise ArgumentError("HARD", hard, "the name of a hard impact")
+    mass, rows, velocity = case.mass_matrix, case.contact_jacobian, case.velocity
+    return ImpactProblem.from_impact(mass, rows, velocity, case.restitution, name=name)
+
+
+def _scene_impact(scene: str, name: str) -> ImpactProblem:
+    """Return the impact of a scene with the most contacts."""
+    return _posed(max(scene_impacts(scene).cases, key=lambda case: case.contacts), name)
+
+
+def _hyperstatic() -> Iterator[tuple[str, Maker]]:
+    for case in random_cases(1, restitutions=(0.5,), families=FAMILIES, seed=_SEED):
+        if case.redundancy:
+            yield f"{case.family}, {case.redundancy} redundant of {case.contacts}", partial(_posed, case)
+    for contacts in HYPERSTATIC_CONTACTS:
+        for make in (patch, pile):
+            case = make(contacts, np.random.default_rng([_SEED, contacts]))
+            yield f"{make.__name__} of {contacts}", partial(_posed, case)
+
+
+def _posed(case: ImpactCase, name: str) -> ImpactProblem:
+    return ImpactProblem.from_impact(*case.arrays, case.restitution, name=name)
+
+
+def _with_friction() -> Iterator[tuple[str, Maker]]:
+    """Yield a box that lands on a patch and slides with dry friction, and a rod wedged between two walls."""
+    for contacts in FRICTIONAL_CONTACTS:
+        for mu in FRICTIONS:
+            yield f"patch of {contacts}, μ = {mu:g}", partial(_rough_patch, contacts, mu)
+    for mu in FRICTIONS:
+        yield f"rod between walls, μ = {mu:g}", partial(_wedged_rod, mu)
+
+
+def _rough_patch(contacts: int, mu: float, name: str) -> ImpactProblem:
+    case = patch(contacts, np.random.default_rng([_SEED, contacts, 3]))
+    rows = _with_tangents(case.contact_jacobian)
+    return ImpactProblem.from_impact(case.mass_matrix, rows, case.velocity, 0.0, mu, name=name)
+
+
+def _with_tangents(normals: np.ndarray) -> Floats:
+    """Return a normal and two tangent rows for every contact of the patch: (k, 6) -> (3k, 6)."""
+    rows = []
+    for normal in normals:
+        point = np.array([-normal[4], normal[3], -0.5])  # a point r has r × z = (y, −x, 0)
+        rows += [normal, *(np.concatenate([t, np.cross(point, t)]) for t in np.eye(3)[:2])]
+    return np.array(rows)
+
+
+def _wedged_rod(mu: float, name: str) -> ImpactProblem:
+    """A turning rod whose ends press on two facing walls: the normals are opposite, so friction alone can hold it."""
+    points, normals = ((-0.6, -0.8), (0.6, 0.8)), ((1.0, 0.0), (-1.0, 0.0))
+    rows = [_row(np.array(point), np.array(direction)) for point, (x, y) in zip(points, normals, strict=True)
+            for direction in ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))]  # fmt: skip
+    velocity = np.array([0.0, -0.4, 0.1, 0.0, 0.0, 0.7])
+    mass = np.diag([1.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0])
+    return ImpactProblem.from_impact(mass, np.array(rows), -velocity, 0.0, mu, name=name)
+
+
+def _row(point: Floats, direction: Floats) -> Floats:
+    """Return the row that maps (v, ω) to the velocity of the point (x, y) along a direction."""
+    return np.concatenate([direction, np.cross([*point, 0.0], direction)])

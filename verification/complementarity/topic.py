@@ -1,0 +1,124 @@
+"""Topic: IAPB and its three assumptions against complementarity, in outcome and in cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from iapb.scene import find_scene, load_scene, scene_names
+from reference.complementarity.laws import LAWS
+from reference.worlds import WORLDS
+from verification.check import Check, Study, Topic
+from verification.complementarity.agreement import MAP, TWO_CONTACTS
+from verification.complementarity.convergence import CONVERGENCE
+from verification.complementarity.extensions import BAR, FRICTION, UNEQUAL
+from verification.complementarity.piles import piles
+from verification.complementarity.solvers import LONGEST, OWN, SOLVER_LIST, collections
+from verification.cost.step_cost import COST_COLUMNS, STEP_COLUMNS, impact_cost, world_cost
+from verification.finding import REPRODUCED, Part
+from verification.mechanics.engine_differences import scene_difference
+from verification.table import Column, Row, Table
+
+# Optional folder of contact problems by others, next to the project. A clone does not need it.
+FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
+REPEATS = {"quick": 3, "full": 7}  # of the timings
+CONFIGURATIONS = 20  # number of configurations of each scene in which engine and references are compared
+# Largest difference of engine and references: the rounding of some dozens of products of entries of size one.
+SAME_MECHANICS = 1e-12
+WORLD_SCENE = "peg_corner"
+
+
+def complementarity(folders: Mapping[str, Path], worlds: Iterable[str] = ()) -> Topic:
+    """Return the comparison on random impacts, scenes, extensions, cost, and folders of problem files by name.
+
+    worlds : those whose contact law and coupling are listed
+    """
+    return Topic(
+        key="complementarity", title="Against complementarity",
+        question="IAPB solves (21): every colliding contact separates with e times its approach velocity, and impulses "
+        "may pull. A linear complementarity problem (LCP) allows only pushing impulses and decides which contacts "
+        "push. Both laws are applied to the same impacts: random families of known geometry, every impact of the "
+        "project's scenes, and problems that solvers find hard. A solution counts only if its residuals, recomputed "
+        "from the problem, are small. Velocities after the impact are compared in the kinetic metric, relative to "
+        "|v⁻|.",
+        checks=(MAP, TWO_CONTACTS, piles(folders.values()), FRICTION, UNEQUAL, BAR, CONVERGENCE, REFERENCES,
+                IMPACT_TIMES, STEP_TIMES, *collections({OWN: None, **folders}), LAW_LIST, SOLVER_LIST,
+                *([_world_list(worlds)] if worlds else [])),
+        says=_answer,
+    )  # fmt: skip
+
+
+def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
+    rows = tables["map"].records()
+    cases = sum(row["cases"] for row in rows) or 1
+    agree = sum(row["share that agrees"] * row["cases"] for row in rows) / cases
+    held = sum(part.verdict == REPRODUCED for part in parts)
+    return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree exactly "
+            f"where pushing impulses (p >= 0) can produce IAPB's velocity "
+            f"({sum(row['contradictions'] for row in rows)} exceptions). {held} of {len(parts)} findings are "
+            "reproduced without restriction.")
+
+
+def _difference(study: Study, name: str) -> Row:
+    d = scene_difference(load_scene(find_scene(name)), CONFIGURATIONS)
+    return {"scene": d.scene, "configurations": d.configurations, "with other contacts": d.apart, "M": d.mass_matrix,
+            "B + G": d.inner_forces, "frame Jacobians": d.frame_jacobian, "contacts": d.contacts, "gap [m]": d.gap,
+            "normal": d.normal, "contact row": d.row}  # fmt: skip
+
+
+REFERENCES = Check(
+    key="references", question="The references compute M and B + G with Pinocchio and contacts in closed form; the "
+    "engine's agree to 1e-12.",
+    cases=lambda study: scene_names(), row=_difference, digits=2,
+    holds=lambda row: max(row["M"], row["B + G"], row["gap"]) <= SAME_MECHANICS,
+    note="Largest differences between engine and reference: relative to the largest entry for M, B + G and Jacobians, "
+    "absolute for contacts. Contacts differ, for example, where two faces are equally deep.",
+)  # fmt: skip
+
+
+def _times(key: str, columns: Sequence[Column], make: Callable[[Study], Table], note: str = "") -> Check:
+    """Return a check that shows a table of times."""
+    return Check(
+        key=key, question="", cases=lambda study: make(study).by_title(), row=lambda study, row: row, note=note,
+        digits=3, conditions=[column.key for column in columns if column.condition],
+        timed=[column.key for column in columns if column.timed],
+    )  # fmt: skip
+
+
+IMPACT_TIMES = _times(
+    "time per impact", COST_COLUMNS, note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. "
+    "Kernels are called from compiled code, all others from Python, checks included.",
+    make=lambda study: impact_cost(repeats=REPEATS[study.depth], longest=LONGEST[study.depth], failures=study.failures),
+)  # fmt: skip
+STEP_TIMES = _times("time per step", STEP_COLUMNS, lambda study: world_cost(repeats=REPEATS[study.depth],
+                                                                           failures=study.failures))  # fmt: skip
+
+
+def _law(study: Study, name: str) -> Row:
+    law = LAWS[name]
+    return {"law": law.name, "statement": law.statement, "source": law.source, "hypotheses": law.hypotheses,
+            "never gains energy under them": law.never_gains_energy}  # fmt: skip
+
+
+LAW_LIST = Check(key="laws", question="", cases=lambda study: LAWS, row=_law)
+
+
+def _world(study: Study, world: str) -> Row:
+    run = study.run(study.scene(WORLD_SCENE), world, keep=False)
+    return {"world": world, "contact law": run.law, "its settings": _settings(run.law_settings),
+            "coupling": run.coupling, "its gains": _settings(run.coupling_settings)}  # fmt: skip
+
+
+def _settings(values: Any) -> str:
+    texts = (f"{name} {json.dumps(value, ensure_ascii=False)}" for name, value in dict(values).items())
+    return ", ".join(texts) or "none"
+
+
+def _world_list(worlds: Iterable[str]) -> Check:
+    return Check(key="worlds", question="", cases=lambda study: worlds, row=_world,
+                 note=f"From the run file of {WORLD_SCENE} in each world.")  # fmt: skip
+
+
+TOPIC = complementarity({"published problems": FOLDER} if FOLDER.is_dir() else {}, WORLDS)
