@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import IapbError
 from iapb.run import Run
-from iapb.scene import Scene
+from iapb.scene import Scene, scene_from_text
 from reference.exact import condition_number, exact_impact, row_condition_number
 from verification.hard_cases.exact import FrictionalImpact, exact_poisson
 
@@ -168,6 +169,18 @@ class TrajectoryCase:
 
 
 AnyCase = HardCase | TrajectoryCase
+
+
+def on_floor(
+    name: str, title: str, bodies: list[dict[str, Any]], contact: dict[str, Any], *, duration: float,
+    source: str = "textbook", rate: float = 1000.0, gravity: tuple[float, float] = (0.0, -9.81), level: float = 0.0,
+    **more: Any,
+) -> Scene:  # fmt: skip
+    """Return a scene in the plane with a floor at a level [m], with the paper's forces; `more` are other sections."""
+    floor = {"name": "floor", "kind": "half_plane", "point": [0.0, level], "normal": [0.0, 1.0]}
+    given = {"name": name, "title": title, "source": source, "rate": rate, "duration": duration, "gravity": gravity,
+             "bodies": bodies, "walls": [floor], "contact": {"forces": "paper", **contact}, **more}  # fmt: skip
+    return scene_from_text(json.dumps(given))
 
 
 def largest_gain(run: Run) -> float:

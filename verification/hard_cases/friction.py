@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-from iapb.scene import Scene, scene_from_text
+from iapb.scene import Scene
 from verification.hard_cases.case import (
     COULOMB,
     NEWTON_COULOMB,
@@ -26,6 +26,7 @@ from verification.hard_cases.case import (
     Measured,
     TrajectoryCase,
     largest_gain,
+    on_floor,
 )
 
 _G = 9.81
@@ -64,23 +65,15 @@ def double_pendulum_with_friction() -> HardCase:
     )  # fmt: skip
 
 
-_SCENE = f"""
-name: kane_levinson
-title: Kane and Levinson's double pendulum on a rough floor
-source: "{_SOURCE}"
-rate: 2000
-duration: 0.5
-gravity: [0, -{_G}]
-bodies:
-  - {{name: upper, joint: revolute, mass: 1.0, center_of_mass: [0.5, 0], inertia: 0.08333333333333333,
-     position: [{math.atan2(5, 12) - math.pi / 2!r}]}}
-  - {{name: lower, parent: upper, joint: revolute, origin: [1, 0], mass: 1.0, center_of_mass: [0.5, 0],
-     inertia: 0.08333333333333333, shapes: [{{kind: circle, radius: 1.0e-6, center: [1, 0]}}],
-     position: [{math.atan2(8, 15) - math.atan2(5, 12)!r}], velocity: [-0.1]}}
-walls: [{{name: floor, kind: half_plane, point: [0, {_FLOOR!r}], normal: [0, 1]}}]
-contact: {{forces: paper, restitution: {_RESTITUTION}, friction: {_FRICTION}, stiffness: 1e4, damping: 100,
-          coherence_distance: 1e-2}}
-"""
+_ROD_BODY = {"joint": "revolute", "mass": 1.0, "center_of_mass": [0.5, 0.0], "inertia": 1.0 / 12.0}
+_PENDULUM = [
+    {"name": "upper", **_ROD_BODY, "position": [math.atan2(5, 12) - math.pi / 2]},
+    {"name": "lower", "parent": "upper", **_ROD_BODY, "origin": [1.0, 0.0], "velocity": [-0.1],
+     "shapes": [{"kind": "circle", "radius": 1e-6, "center": [1.0, 0.0]}],
+     "position": [math.atan2(8, 15) - math.atan2(5, 12)]},
+]  # fmt: skip
+_ON_TIP = {"restitution": _RESTITUTION, "friction": _FRICTION, "stiffness": 1e4, "damping": 100.0,
+           "coherence_distance": 1e-2}  # fmt: skip
 
 
 def double_pendulum_motion() -> TrajectoryCase:
@@ -93,7 +86,9 @@ def double_pendulum_motion() -> TrajectoryCase:
         "guarantee this",
         "kinetic plus potential energy never exceeds that at the start; until the tip touches, the motion is that of "
         "the equations of two rods, integrated to twelve digits",
-        scene_from_text(_SCENE), _measure_pendulum, worlds=("IAPB", "PB", "ideal", COULOMB),
+        on_floor("kane_levinson", "Kane and Levinson's double pendulum on a rough floor", _PENDULUM, _ON_TIP,
+                 source=_SOURCE, rate=2000, duration=0.5, level=_FLOOR),
+        _measure_pendulum, worlds=("IAPB", "PB", "ideal", COULOMB),
     )  # fmt: skip
 
 
@@ -139,22 +134,6 @@ _KEPT = 1e-6
 # First-order error of a rigid step with Coulomb's law: half a step of the duration changes the distance by 6e-4.
 _FIRST_ORDER = 0.01
 
-_BLOCK = """
-name: pushed_block
-title: A block pushed along the floor
-source: textbook
-rate: 4000
-duration: {duration}
-gravity: [0, -{g}]
-bodies:
-  - {{name: block, joint: planar, mass: 1.0, inertia: 0.0020833333333333333,
-     shapes: [{{kind: box, size: [0.15, 0.05]}}], position: [0, {height}, 0]}}
-walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
-contact: {{forces: paper, stiffness: 1e4, damping: 100, friction: {mu}, friction_law: {law},
-          friction_velocity: {creep}, coherence_distance: 2e-3}}
-hand: {{body: block, point: [0, -{level}], force: [{force}, 0, 0]}}
-"""
-
 
 def sticking_threshold() -> TrajectoryCase:
     """A block on the floor, pushed with 0.99 μ m g."""
@@ -194,8 +173,13 @@ def _creep(share: float, steps: int, dt: float) -> float:
 
 def _block(share: float, law: str = "coulomb") -> Scene:
     depth = _G / (2.0 * 1e4)  # static overlap of the block on two springs; friction acts at half of it
-    return scene_from_text(_BLOCK.format(duration=_DURATION, g=_G, height=0.025 - depth, level=0.025 - 0.5 * depth,
-                                         mu=_MU, law=law, creep=_CREEP, force=share * _MU * _G))  # fmt: skip
+    block = {"name": "block", "joint": "planar", "mass": 1.0, "inertia": 0.0020833333333333333,
+             "shapes": [{"kind": "box", "size": [0.15, 0.05]}], "position": [0.0, 0.025 - depth, 0.0]}
+    hand = {"body": "block", "point": [0.0, -(0.025 - 0.5 * depth)], "force": [share * _MU * _G, 0.0, 0.0]}
+    contact = {"stiffness": 1e4, "damping": 100.0, "friction": _MU, "friction_law": law, "friction_velocity": _CREEP,
+               "coherence_distance": 2e-3}
+    return on_floor("pushed_block", "A block pushed along the floor", [block], contact, rate=4000, duration=_DURATION,
+                    hand=hand)  # fmt: skip
 
 
 def _pushed(share: float, name: str, expected: str) -> TrajectoryCase:
@@ -220,21 +204,11 @@ _SINE, _COSINE, _ROUGH, _SPEED, _STIFF = 0.8, 0.6, 2.0, 1.0, 1e4
 _HEIGHT = 0.5 * _SINE + 1e-6 - 1e-9  # of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
 _STOPPED_SLIP = 1e-3  # [m/s] v_threshold of (6): below it friction decreases
 
-_ROD = f"""
-name: painleve_rod
-title: Painlevé's rod
-source: Painlevé (1895)
-rate: 4000
-duration: 0.1
-gravity: [0, -{_G}]
-bodies:
-  - {{name: rod, joint: planar, mass: 1.0, inertia: 0.08333333333333333,
-     shapes: [{{kind: circle, radius: 1.0e-6, center: [-0.5, 0]}}],
-     position: [0, {_HEIGHT!r}, {math.atan2(_SINE, _COSINE)!r}], velocity: [-{_SPEED}, 0, 0]}}
-walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
-contact: {{forces: paper, stiffness: {_STIFF}, damping: 0, friction: {_ROUGH}, friction_velocity: {_STOPPED_SLIP},
-          coherence_distance: 5e-3}}
-"""
+_ROD = {"name": "rod", "joint": "planar", "mass": 1.0, "inertia": 1.0 / 12.0, "velocity": [-_SPEED, 0.0, 0.0],
+        "shapes": [{"kind": "circle", "radius": 1e-6, "center": [-0.5, 0.0]}],
+        "position": [0.0, _HEIGHT, math.atan2(_SINE, _COSINE)]}  # fmt: skip
+_ON_END = {"stiffness": _STIFF, "damping": 0.0, "friction": _ROUGH, "friction_velocity": _STOPPED_SLIP,
+           "coherence_distance": 5e-3}  # fmt: skip
 
 
 def painleve_rod() -> TrajectoryCase:
@@ -246,7 +220,8 @@ def painleve_rod() -> TrajectoryCase:
         "diverge",
         "it jams: a rigid contact at once, a spring once its force has grown large enough",
         f"springs: the slip of the rod's own equations, stopped after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
-        scene_from_text(_ROD), _measure_rod, _WORLDS,
+        on_floor("painleve_rod", "Painlevé's rod", [_ROD], _ON_END, source="Painlevé (1895)", rate=4000, duration=0.1),
+        _measure_rod, _WORLDS,
     )  # fmt: skip
 
 
@@ -300,28 +275,16 @@ _THICK, _THIN = 2e-3, 4e-4  # the plate's height and the ball's radius [m]
 # whose exact duration is zero, lasts up to one step.
 _LATE = 4.0
 
-_PLATE = """
-name: stick_slip
-title: A plate pushed by a spring
-source: textbook
-rate: 4000
-duration: {duration}
-gravity: [0, -{g}]
-bodies:
-  - {{name: plate, joint: planar, mass: 1.0, inertia: 0.001875, shapes: [{{kind: box, size: [0.15, {thick}]}}],
-     position: [0, {height!r}, 0], velocity: [{speed}, 0, 0]}}
-  - {{name: ball, joint: prismatic, axis: [1, 0], origin: [{behind!r}, {height!r}], mass: 1e8,
-     shapes: [{{kind: circle, radius: {thin}}}], velocity: [{speed}]}}
-walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
-contact: {{forces: paper, stiffness: {press}, damping: 0, friction: {mu}, coherence_distance: 2e-3}}
-"""
-
 
 def stick_slip() -> TrajectoryCase:
     """A plate of 1 kg on a rough floor, pushed by a spring whose other end moves at constant speed."""
     amplitude, depth = _STEADY / _OMEGA, 1.5 * _SLIDING
-    scene = _PLATE.format(g=_G, height=0.5 * _THICK - _G / (2.0 * _PRESS), behind=-0.075 - _THIN + depth, mu=_MU,
-                          thick=_THICK, thin=_THIN, press=_PRESS, speed=_STEADY, duration=_PRESSED)  # fmt: skip
+    height = 0.5 * _THICK - _G / (2.0 * _PRESS)
+    plate = {"name": "plate", "joint": "planar", "mass": 1.0, "inertia": 0.001875, "velocity": [_STEADY, 0.0, 0.0],
+             "shapes": [{"kind": "box", "size": [0.15, _THICK]}], "position": [0.0, height, 0.0]}
+    ball = {"name": "ball", "joint": "prismatic", "axis": [1, 0], "origin": [-0.075 - _THIN + depth, height],
+            "mass": 1e8, "shapes": [{"kind": "circle", "radius": _THIN}], "velocity": [_STEADY]}
+    contact = {"stiffness": _PRESS, "damping": 0.0, "friction": _MU, "coherence_distance": 2e-3}
 
     def measure(run: Run) -> Measured:
         """Measure the largest distance from the closed form, relative to the cycle's amplitude, and the energy gain.
@@ -342,7 +305,8 @@ def stick_slip() -> TrajectoryCase:
         "one slip, one stick, then for ever the same cycle of 2π/ω",
         "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "
         "v = V (1 − cos ωt), whatever it began with",
-        scene_from_text(scene), measure, ("IAPB", "PB"),
+        on_floor("stick_slip", "A plate pushed by a spring", [plate, ball], contact, rate=4000, duration=_PRESSED),
+        measure, ("IAPB", "PB"),
     )  # fmt: skip
 
 

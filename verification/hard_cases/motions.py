@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from iapb.run import Run
 from iapb.scene import find_scene, load_scene, scene_from_text
-from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain
+from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain, on_floor
 
 # --- a ball that chatters --------------------------------------------------------------------------------------
 _HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
@@ -17,19 +18,9 @@ _HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
 # first bounce penetrates by one step, and the height between two instants has an error of one step, too.
 _STEPS_LATE = 4.0
 
-_SCENE = f"""
-name: chatter
-title: A ball that chatters to rest
-source: textbook
-rate: 1000
-duration: 1.0
-gravity: [0, {-_GRAVITY}]
-bodies:
-  - {{name: ball, joint: prismatic, axis: [0, 1], mass: 1.0, shapes: [{{kind: circle, radius: {_RADIUS}}}],
-     position: [{_RADIUS + _HEIGHT}]}}
-walls: [{{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}]
-contact: {{forces: paper, restitution: {_RESTITUTION}, stiffness: 1e5, damping: 200, coherence_distance: 5e-3}}
-"""
+_BALL = {"name": "ball", "joint": "prismatic", "axis": [0, 1], "mass": 1.0, "position": [_RADIUS + _HEIGHT],
+         "shapes": [{"kind": "circle", "radius": _RADIUS}]}  # fmt: skip
+_HARD = {"restitution": _RESTITUTION, "stiffness": 1e5, "damping": 200.0, "coherence_distance": 5e-3}
 
 
 def chatter() -> TrajectoryCase:
@@ -40,7 +31,7 @@ def chatter() -> TrajectoryCase:
         "bouncing",
         "the parabolas as far as the time step resolves them, then rest",
         f"parabolas of heights h e²ᵏ in closed form, at rest from {_end():.4f} s on",
-        scene_from_text(_SCENE), _measure_chatter,
+        on_floor("chatter", "A ball that chatters to rest", [_BALL], _HARD, duration=1.0), _measure_chatter,
     )  # fmt: skip
 
 
@@ -168,17 +159,6 @@ def _measure_peg(run: Run) -> Measured:
 
 # --- Newton's cradle whose balls touch ---------------------------------------------------------------------------
 # Radii and positions are binary fractions, so that gaps are exactly 0, or decimal fractions, so that gaps are rounding.
-_BALL = "{{name: ball_{k}, joint: prismatic, axis: [1, 0], mass: 1.0, shapes: [{{kind: circle, radius: {r}}}], "
-_CRADLE = """
-name: touching_cradle
-title: Newton's cradle whose balls touch
-source: textbook
-rate: 1000
-duration: 0.3
-bodies:
-{balls}
-contact: {{forces: paper, stiffness: {stiffness}, damping: 0, restitution: 1, coherence_distance: 2e-3}}
-"""
 _CRADLE_STIFFNESS = 1e4
 # Undamped springs that are sampled once per step conserve energy up to the second-order error 2 K Δt² / m.
 _BY_SPRINGS = 2.0 * _CRADLE_STIFFNESS * 1e-6
@@ -211,8 +191,13 @@ def cradle_a_micrometre_sunk() -> TrajectoryCase:
 
 def _cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
     places = [-0.021875 - 2.0 * radius] + [k * (2.0 * radius + gap) for k in range(4)]
-    balls = [f"  - {_BALL.format(k=k, r=radius)}position: [{x!r}], velocity: [{float(k == 0)}]}}"
+    balls = [{"name": f"ball_{k}", "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "position": [x],
+              "velocity": [float(k == 0)], "shapes": [{"kind": "circle", "radius": radius}]}
              for k, x in enumerate(places)]  # fmt: skip
+    contact = {"forces": "paper", "stiffness": _CRADLE_STIFFNESS, "damping": 0.0, "restitution": 1.0,
+               "coherence_distance": 2e-3}  # fmt: skip
+    scene = {"name": "touching_cradle", "title": "Newton's cradle whose balls touch", "source": "textbook",
+             "rate": 1000, "duration": 0.3, "bodies": balls, "contact": contact}  # fmt: skip
 
     def measure(run: Run) -> Measured:
         """Measure the relative error of momentum and energy at the end; both must equal those of the first ball."""
@@ -227,5 +212,5 @@ def _cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
         "the outcome depends on which contacts collide: impulses or springs transmit the momentum",
         "momentum is conserved and no energy created, whichever ball leaves",
         "momentum and energy of five equal elastic balls: Σ v = 1 and Σ v² = 1",
-        scene_from_text(_CRADLE.format(balls="\n".join(balls), stiffness=_CRADLE_STIFFNESS)), measure,
+        scene_from_text(json.dumps(scene)), measure,
     )  # fmt: skip

@@ -12,31 +12,15 @@ import math
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene import Scene, scene_from_text
-from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain
+from iapb.scene import Scene
+from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain, on_floor
 
-_G, _MU, _RATE = 9.81, 0.5, 1000.0
+_G, _MU = 9.81, 0.5
 _ENGINE = ("IAPB", "PB", "IAPB-friction")
 # Width and height [m], stiffness [N/m]. The slabs of a stack oscillate on their springs without slipping.
 _BOX, _SLAB = (0.15, 0.05, 1e4), (0.3, 0.02, 5e4)
 _LONG = 10.0  # [s]
 _SECOND_ORDER = 0.02  # relative error of the lean per box: the contact point lies at half the overlap
-
-_HEAD = """
-name: {name}
-title: {title}
-source: textbook
-rate: {rate}
-duration: {duration}
-gravity: [{along!r}, {down!r}]
-bodies:
-{bodies}
-walls:
-  - {{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}}
-contact: {{forces: paper, stiffness: {stiffness}, damping: 50, friction: {mu}, coherence_distance: 2e-3}}
-"""
-_BODY = """  - {{name: box_{k}, joint: planar, mass: 1.0, inertia: {inertia!r}, position: [0, {y!r}, 0],
-     velocity: [{v}, 0, 0], shapes: [{{kind: box, size: [{w}, {h}]}}]}}"""
 
 
 def _boxes(
@@ -46,11 +30,12 @@ def _boxes(
     (width, height, stiffness), level, boxes = sort, 0.0, []
     for k in range(count):
         level += height - (count - k) * _G * math.cos(slope) / (2.0 * stiffness)
-        boxes.append(_BODY.format(k=k, inertia=(width**2 + height**2) / 12.0, y=level - 0.5 * height, v=speed,
-                                 w=width, h=height))  # fmt: skip
-    return scene_from_text(_HEAD.format(
-        name=name, title=title, rate=_RATE, duration=_LONG, along=_G * math.sin(slope), down=-_G * math.cos(slope),
-        bodies="\n".join(boxes), stiffness=stiffness, mu=_MU))  # fmt: skip
+        boxes.append({"name": f"box_{k}", "joint": "planar", "mass": 1.0, "inertia": (width**2 + height**2) / 12.0,
+                      "position": [0.0, level - 0.5 * height, 0.0], "velocity": [speed, 0.0, 0.0],
+                      "shapes": [{"kind": "box", "size": [width, height]}]})  # fmt: skip
+    contact = {"stiffness": stiffness, "damping": 50.0, "friction": _MU, "coherence_distance": 2e-3}
+    return on_floor(name, title, boxes, contact, duration=_LONG,
+                    gravity=(_G * math.sin(slope), -_G * math.cos(slope)))  # fmt: skip
 
 
 def nudged_box() -> TrajectoryCase:
