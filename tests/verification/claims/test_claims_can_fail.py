@@ -1,4 +1,4 @@
-"""The rule of every claim confirms a row that agrees, refutes one that contradicts, and says where a row cannot tell."""
+"""The rule of every claim confirms a row that agrees, refutes one that contradicts, says where a row cannot tell."""
 
 import numpy as np
 import pytest
