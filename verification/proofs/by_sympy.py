@@ -120,18 +120,17 @@ def refusal(block: Block, certificates: Sequence[Sequence[str]], comparisons: It
         if rule and rule[0] in _RULES:
             if not any(_RULES[rule[0]](text, claim, one, other) for one in known for other in (*known, None)):
                 return f"'{name}': SymPy finds no facts from which it follows by {rule[0]}"
+        elif claim.relation not in ("=", "≥", "⪰"):
+            return f"'{name}': a certificate shows no such relation"
         else:
-            cofactors = [line for line in lines if "[" in line]
-            terms = [[text.read(factor) for factor in line.split(" · ")] for line in lines if "[" not in line]
-            for bracket in (re.search(r"\[(.*)\]", line) for line in cofactors):
-                if bracket and not _established(text, text.read(bracket[1]), known):
-                    return f"'{name}': SymPy knows no equation {bracket[0]}"
-            if claim.relation not in ("=", "≥", "⪰") or (terms and claim.relation == "="):
-                return f"'{name}': a certificate shows no such relation"
-            for term in terms:
-                if not _not_negative(text, term, known):
-                    return f"'{name}': SymPy does not see that {sympy.Mul(*term)} is not negative"
-            rest = claim.value - sympy.Add(*map(text.read, cofactors), *(sympy.Mul(*term) for term in terms))
+            rest = claim.value
+            for factors in (line.split(" · ") for line in lines):
+                values = [text.read(factor) for factor in factors]
+                equations = [value for factor, value in zip(factors, values, strict=True) if factor[0] == "["]
+                if not (_established(text, equations[0], known) if equations else
+                        claim.relation != "=" and _not_negative(text, values, known)):  # fmt: skip
+                    return f"'{name}': SymPy knows no fact for {' · '.join(factors)}"
+                rest -= sympy.Mul(*values)
             if not text.same(rest, 0):
                 return f"'{name}': SymPy leaves {text.canonical(rest)}"
         known.append(claim)

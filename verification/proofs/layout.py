@@ -83,7 +83,7 @@ class Block:
 
 def all_names() -> tuple[str, ...]:
     """Return the names of all statements, in reading order."""
-    return tuple(name for file in FILES for name in _texts(file))
+    return tuple(_statements())
 
 
 def block(name: str) -> Block:
@@ -93,14 +93,18 @@ def block(name: str) -> Block:
 
 def text_of(name: str) -> str:
     """Return the lines of a statement, without its name."""
-    if name not in all_names():
-        raise ArgumentError("name", name, one_of(name, all_names()))
-    return next(_texts(file)[name] for file in FILES if name in _texts(file))
+    if name not in _statements():
+        raise ArgumentError("name", name, one_of(name, _statements()))
+    return _statements()[name]
 
 
 def read(name: str, text: str) -> Block:
     """Return the block of these lines, with the letters that all statements share."""
     return Block(name, tuple(_with_shared((*_entries(_texts(SHARED)["letters"]), *_entries(text)))))
+
+
+def _statements() -> dict[str, str]:
+    return {name: text for file in FILES for name, text in _texts(file).items()}
 
 
 @cache
@@ -124,10 +128,13 @@ def _entries(text: str) -> Iterator[Entry]:
     for key, _, rest in (line.partition(" ") for line in joined):
         if key not in _KEYS:
             raise ArgumentError("statement", key, one_of(key, sorted(_KEYS)))
-        formula, _, note = (rest.strip(), "", "") if key in _PROSE else rest.partition(" -- ")
-        formula, _, case = (formula, "", "") if key in _PROSE else formula.partition("@")
-        words, _, formula = ("", "", formula) if key in _PROSE else formula.rpartition(" :: ")
-        yield Entry(key, words.strip(), " ".join(formula.split()), case.strip(), note.strip())
+        if key in _PROSE:
+            yield Entry(key, "", rest.strip())
+            continue
+        rest, _, note = rest.partition(" -- ")
+        rest, _, case = rest.partition("@")
+        words, _, formula = rest.rpartition(" :: ")
+        yield Entry(key, words.strip(), formula.strip(), case.strip(), note.strip())
 
 
 def _with_shared(entries: Iterable[Entry]) -> Iterator[Entry]:
