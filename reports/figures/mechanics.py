@@ -81,7 +81,7 @@ _QUANTITIES = {
     "momentum drift": ("Angular momentum", "momentum drift (relative)"),
     "attitude error": ("Attitude", "attitude error [rad]"),
 }
-_INTEGRATORS = {
+INTEGRATORS = {
     "momentum": STYLES["momentum"],
     "semi_implicit_euler": STYLES["semi-implicit Euler"],
     "midpoint": STYLES["midpoint"],
@@ -100,9 +100,9 @@ _INTEGRATORS = {
 def tumbling_drift(numbers: Table) -> Drawn:
     """Draw attitude error and drifts of each integrator against the step, with the declared slopes."""
     series = [(look.name, look, numbers.where(integrator=integrator, motion="turning over").records())
-              for integrator, look in _INTEGRATORS.items()]  # fmt: skip
+              for integrator, look in INTEGRATORS.items()]  # fmt: skip
     panels = tuple(_drift(series, column, *names) for column, names in _QUANTITIES.items())
-    legend = (*((look.name, look) for look in _INTEGRATORS.values()), ("declared slope", BOUND))
+    legend = (*((look.name, look) for look in INTEGRATORS.values()), ("declared slope", BOUND))
     return Drawn(panels, numbers, legend)
 
 
@@ -118,7 +118,7 @@ def _drift(series: Sequence[tuple[str, LineStyle, Rows]], column: str, name: str
     return Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name)
 
 
-_SETTINGS = looks_of(("no filter", "coherence alone", "clustering alone", "both filters"))
+FILTERS = looks_of(("no filter", "coherence alone", "clustering alone", "both filters"))
 _DAMPING = 40.0  # [N s/m] of the panels in time: the scene's own
 _DURATION = 2.0  # [s]
 
@@ -143,20 +143,20 @@ def socket_collisions(times: Table, counts: Table) -> Drawn:
               "Energy lost in false collisions, cumulative.", "Energy that they take"),
         Panel(_bars(counts), words, "By damping of the contact"),
     )  # fmt: skip
-    return Drawn(panels, counts, tuple(_SETTINGS.items()))
+    return Drawn(panels, counts, tuple(FILTERS.items()))
 
 
 def _in_time(numbers: Table, column: str, label: str) -> str:
     with Plot(f"socket-collisions-{numbers.keys.index(column)}") as plot:
         axes, here = plot.axes, numbers.where(damping=_DAMPING)
-        for setting, style in _SETTINGS.items():
+        for setting, style in FILTERS.items():
             mine = here.where(filters=setting)
             time, value = [0.0, *mine.column("time"), _DURATION], [0.0, *mine.column(column)]
             look = line_arguments(style, marked=bool(mine.rows))
             axes.step(time, [*value, value[-1]], where="post", **look | {"markevery": 4, "clip_on": False})
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, _DURATION))
         axes.set_ylim(bottom=0.0)
-        none = " and ".join(setting for setting in _SETTINGS if setting not in here.column("filters"))
+        none = " and ".join(setting for setting in FILTERS if setting not in here.column("filters"))
         note(axes, (_DURATION, 0.0), f"{none}: none" if none else "", (-2, 8), ha="right", fontsize=8.5)
     return plot.svg
 
@@ -165,7 +165,7 @@ def _bars(numbers: Table) -> str:
     dampings = sorted(set(numbers.column("damping")))
     with Plot("socket-collisions-damping") as plot:
         axes = plot.axes
-        for number, (setting, style) in enumerate(_SETTINGS.items()):
+        for number, (setting, style) in enumerate(FILTERS.items()):
             heights = [numbers.where(filters=setting, damping=b).column("false collisions")[0] for b in dampings]
             places = [k + 0.2 * (number - 1.5) for k in range(len(dampings))]
             axes.bar(places, heights, width=0.17, color=style.color)

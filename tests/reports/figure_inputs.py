@@ -1,68 +1,177 @@
-"""Tables for every figure, and the README's second picture: rows of a real report, thinned and rounded, kept here.
-
-Where a study's columns have changed and a figure no longer finds them, take them again from a new report:
-
-    iapb reproduce && python -m tests.reports.figure_inputs out
-"""
+"""Small made-up tables with the columns that the figures read: powers and waves, each outcome and each gap once."""
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from itertools import product
+from math import exp, sin
 from typing import Any
 
-from reports.figures import RECIPES, energy_gains
-from reports.figures.figure import Figure, draw
-from reports.figures.standalone import standalone
-from verification.finding import Column, Table
+import numpy as np
 
-FILE = Path(__file__).with_suffix(".json")
-ENERGY_PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "energy_gains.svg"  # of the README
-_LONG, _KEPT = 300, 12  # rows of a table that is thinned, and of those with the same texts in it
+from iapb import find_scene, load_scene
+from iapb.run import Run
+from iapb.scene.mechanism import mechanism_of
+from reports.figures import RECIPES, complementarity, energy_gains, mechanics
+from reports.figures.two_link_arm import arm_energies
+from verification.cost.calls import PRINTED
+from verification.cost.growth import FACTORED
+from verification.cost.impacts import WAYS
+from verification.cost.trajectories import BELOW, INTEGRATORS, OK, TIMED_OUT, WORLDS
+from verification.finding import Table, titled
+
+_SCENES = tuple(f"scene {k}" for k in range(6))
+STEPS, UNTOUCHED = 128, 40
+_METHODS = tuple(dict.fromkeys((*WORLDS, *INTEGRATORS)))
 
 
 def tables() -> dict[str, Table]:
-    """Return the kept tables by the names under which the figures ask for them."""
-    kept = json.loads(FILE.read_text(encoding="utf-8"))
-    return {name: Table(tuple(Column(key, unit, heading) for key, unit, heading in table["columns"]),
-                        tuple(map(tuple, table["rows"]))) for name, table in kept.items()}  # fmt: skip
+    """Return a table for each input of a figure that is a table."""
+    made: dict[str, tuple[str, Iterable[tuple[Any, ...]]]] = {
+        "C22/C22": ("problem; contacts; ratio; lower quartile; upper quartile", (
+            (problem, c, r, 0.97 * r, 1.03 * r) for problem, power in (("a patch", 0.9), ("a pile", -0.05))
+            for c in (1, 2, 4, 8, 16, 64, 300) for r in [c**power])),
+        "complementarity/map": (
+            "impacts; e; redundant rows; share that agrees; median distance where they differ; largest distance", (
+                (family, e, k, 1.0 - 0.2 * k, 0.3 * k * (1 + e) or None, 0.5 * k * (1 + e))
+                for family in ("one contact", "corner") for k in (0, 2) for e in (0.0, 0.5, 1.0))),
+        "complementarity/two contacts": ("cosine; speed ratio; agreement predicted; agreement found", (
+            (0.1 * k, 0.1 * m, m >= k, m >= k) for k in range(-9, 10, 3) for m in range(1, 11, 3))),
+        "complementarity/piles": (
+            "rows; contacts; redundant; most contacts that agree; median distance from the LCP; pushing from the LCP; "
+            "time of (21) [µs]; time of pushing [µs]", (
+                (rows, c, c / 3, 6, 0.0 if c < 6 else 0.1 * c**0.3, 1e-16, 40.0 + c, 300.0 + c * c)
+                for rows in ("approaching", "touching") for c in (5, 12, 40, 150))),
+        "complementarity/time per impact": (
+            "impacts; contacts; solver; outcome; median [µs]; least [µs]; largest [µs]", (
+            (family, c, solver, "failed" if lost else "solved", t if c < 300 or k else None, 0.9 * t, 1.1 * t)
+            for family in ("patch", "pile") for k, solver in enumerate((*complementarity.TIMED, "quadprog"))
+            for c in (1, 8, 64, 300) for t, lost in [((k + 1) * 3.0**k * c**0.8, k == 4 and c == 64)])),
+        "complementarity/time per step": ("scene; world; median; least; largest", (
+            (scene, world, t, 0.9 * t, 1.2 * t) for m, scene in enumerate(("peg_corner", "peg_hole"))
+            for k, world in enumerate(("IAPB, compiled loop", "ideal (QP per step)")) for t in [10.0**k * (m + 1)])),
+        "complementarity/profile": ("collection; kind; solver; factor; share solved", (
+            ("own problems", kind, solver, factor, min(0.15 * k + 0.1 * m, 1.0))
+            for kind, solvers in (("frictionless", ("lemke", "daqp", "quadprog", "unnamed")), ("friction", ("nsgs",)))
+            for k, solver in enumerate(solvers) for m, factor in enumerate((1.0, 10.0, 100.0, 1e4)))),
+        "complementarity/convergence": ("scene; step [ms]; error of positions; error of velocities", (
+            (scene, h, 1e-4 * k * h, 2e-4 * k * h) for k, scene in enumerate(_SCENES) for h in (2.0, 1.0, 0.5))),
+        "effect_costs": ("scene; effect; time saved [%]; error [mm]; best of its error", (
+            ("peg_corner", effect, 60.0 / (k + 1), 10.0 ** (2 - k) if k < 4 else 0.0, "yes" if k % 2 else "no")
+            for k, effect in enumerate(("hand_force", "wall_contacts", "coherence", "clustering", "friction")))),
+        "effect_steps": ("scene; step [µs]; all on [µs]; shares of the step", (
+            (scene, 0.5 * (k + 1), 0.8 * (k + 1), "friction 40 % (0.2 µs), coupling 20 % (0.1 µs)")
+            for k, scene in enumerate(_SCENES))),
+        "energy-gains/impacts": ("; ".join((energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN,
+                                            energy_gains.SHARE)), (
+            (method, f"1e{k}" if k < 12 else "all", gain * 10.0**k, gain * 10.0 ** (k + 10))
+            for method, gain in (("factored", 0.0), ("factored, no clamp", 1e-17), ("gram_pinv, as printed", 1e-15))
+            for k in range(13))),
+        "engines/errors": (
+            "engine; scene; settings; law; energy error; largest rise of energy; momentum error; overlap / size", (
+                (engine, scene, settings, law, value, value, None if law else 1e-16, value)
+                for k, (engine, law) in enumerate((("iapb (ours)", "met"), ("MuJoCo", "missed"), ("Drake", "failed"),
+                                                   ("Siconos", "not installed")))
+                for m, scene in enumerate(_SCENES) for settings in ("own", "matched")
+                for value in [10.0 ** (3 * k - 16 + m) if k < 2 else None])),
+        "haptic-rate/budgets": (
+            "contacts; rank; budget [rows]; median residual; share of the loss; largest relative gain", (
+            (6 * n, n, k, 0.5 * (1 - k / n), k / n, -0.1) for n in (4, 8, 20) for k in range(n + 1))),
+        "haptic-rate/fitted": ("method; axis; exponent; steepest from; to; there", (
+            (method, axis, 0.9, 1000, 2000, 1.1) for method in (FACTORED, PRINTED)
+            for axis in ("contacts", "coordinates"))),
+        "haptic-rate/scaling": ("method; coordinates; contacts; time [µs]; lower quartile [µs]; upper quartile [µs]", (
+            (method, d, c, t, 0.9 * t, 1.1 * t) for k, method in enumerate((FACTORED, PRINTED))
+            for d, c in ((12, 50), (12, 300), (12, 2000), (3, 60), (24, 60), (96, 60))
+            for t in [10.0**k * d * c ** (0.9 + k)])),
+        "haptic-rate/motions": (
+            "scene; method; step [ms]; time [ms/s]; position; energy; signed energy; energy made; outcome; note", (
+                (scene, method, h, (k + 1) * 4.0 / h,
+                 0.02 * (0.5 * k + m + 1) * h ** (0.5 + 0.2 * k) if k < 6 else 0.05, 1e-10, -1e-10, 0.01 * (k == 3),
+                 TIMED_OUT if h < 0.1 and k == 1 else OK,
+                 f"position {BELOW}" if (h, k) == (0.5, 2) else "")
+                for m, scene in enumerate(_SCENES) for k, method in enumerate(_METHODS)
+                for h in (8.0, 2.0, 0.5, 0.1, 0.02))),
+        "mechanics/coordinate invariance": ("coordinates; contacts; elbow [rad]; error; bound", (
+            (name, contacts, elbow, None if bound > 1e8 else 1e-3 * bound, bound)
+            for name, power in (("absolute angles", 0), ("place of the hand", -2))
+            for contacts in ("one", "two, separated", "two, 1e-08 m apart") for elbow in (1.0, 1e-2, 1e-4, 1e-8, 0.0)
+            for bound in [1e-11 * max(elbow, 1e-12) ** power])),
+        "mechanics/tumbling": (
+            "motion; integrator; step [s]; attitude error [rad]; energy drift [relative]; momentum drift [relative]; "
+            "declared order", (
+                ("turning over", integrator, h, h**order, 0.1 * h**order, 0.01 * h**order, order)
+                for integrator, order in zip(mechanics.INTEGRATORS, (4, 1, 2, 2, 4), strict=True)
+                for h in (0.01, 0.005))),
+        "mechanics/false collisions": ("filters; damping [N s/m]; false collisions", (
+            (name, b, 20 - 6 * k) for k, name in enumerate(mechanics.FILTERS) for b in (10.0, 40.0, 60.0))),
+        "mechanics/false collisions in time": (
+            "filters; damping [N s/m]; time [s]; false collisions so far; energy lost so far, share of the fall", (
+                (name, 40.0, 0.1 * n, n, 0.04 * n / (k + 1)) for k, name in enumerate(mechanics.FILTERS)
+                if k < 3 for n in range(1, 18 - 5 * k))),
+        "mechanics/linked impacts": (
+            "problem; treatment; rows or order; ball; v_x after [m/s]; v_y after [m/s]; energy change; "
+            "momentum change", (
+                (problem, treatment, rows, ball, 0.2 * ball + 0.1 * k, 0.1 * (balls == 3), 0.0, -2.0 * (k == 1))
+                for problem, balls in (("cradle of 2", 2), ("cradle of 5", 5), ("Bernoulli", 3))
+                for k, (treatment, rows) in enumerate((
+                    ("simultaneous, relative rows (12)", "all touching contacts"),
+                    ("simultaneous, per-body rows (13)-(14)", "approaching contacts"),
+                    ("event-driven", "contact 0, then 1"))) for ball in range(balls))),
+        "scene-ledger/books over time": (
+            "scene; time [s]; kinetic [J]; potential [J]; springs [J]; given [J]; lost impacts [J]; lost damping [J]; "
+            "lost friction [J]; impacts", (
+                (scene, 0.1 * n, k * exp(-0.1 * n), 0.0, 0.1 * k * sin(n) ** 2, 0.0, k - k * exp(-0.1 * n), 0.0, 0.0,
+                 n % 7 == 0)
+                for k, scene in enumerate(_SCENES) for n in range(20))),
+        "scene-ledger/contact": ("scene; dimensions; most penetration [mm]; how it ends; energy exchanged [J]", (
+            (scene, 2 + k % 2, 0.3 * k, "keeps moving", 0.1 * k) for k, scene in enumerate(_SCENES))),
+        "stability/dampings": ("damping [N s/m]", ((b,) for b in (0.0, 1.0, 10.0, 100.0, 1000.0))),
+        "stability/maps": (
+            "rate [Hz]; sensors; device damping [N s/m]; stiffness [N/m]; passive up to [N s/m]; penalties; impulses", (
+                (512.0, "ideal", b, K, max(b - K / 1024, 0.0), "xo+ox", "oo++x") for b in (0.0, 5.0)
+                for K in (100.0, 1e3, 1e4))),
+        "stability/hardness": (
+            "rate [Hz]; sensors; device damping [N s/m]; law; stiffness [N/m]; rate-hardness [N/m]; settles after [s]; "
+            "penetration [mm]", (
+                (512.0, "ideal", 0.0, law, K, 26.0 * K if k else 26000.0, 100 / K if K < 1e5 else None, 1e3 / K)
+                for k, law in enumerate(("impulses", "penalty")) for K in (100.0, 1e3, 1e4, 1e5))),
+        "work_precision": (
+            "contacts; coordinates; problem; method; work; called; time [µs]; quartiles [µs]; relative error; "
+            "relative energy gain; restitution residual; failed after [µs]; outcome", _precision_rows()),
+    }  # fmt: skip
+    return {name: titled(columns.split("; "), rows) for name, (columns, rows) in made.items()}
 
 
-def write_tables(inputs: Mapping[str, Any]) -> None:
-    """Write those of the inputs that are tables and that a figure asks for, thinned."""
-    wanted = sorted({name for recipe in RECIPES for name in recipe.needs if isinstance(inputs.get(name), Table)})
-    texts = (f"{json.dumps(name)}: {_text(inputs[name])}" for name in wanted)
-    FILE.write_text("{" + ",\n".join(texts) + "}\n", encoding="utf-8")
+def _precision_rows() -> Iterable[tuple[Any, ...]]:
+    for (c, d), n, (k, way) in product(((1, 3), (60, 12)), range(9), enumerate(WAYS)):
+        lost, time, error = k == 4 and n == 8, 0.3 * c * (1.0 + 0.2 * k), 10.0 ** -(2 + 0.7 * k + 0.1 * n)
+        measured = (None, "", None, None, None, time, "too slow") if lost else (
+            time, "", error, 1e-3 * (way.work == "1 sweep"), 0.0, None, "ok")
+        yield (c, d, f"problem {n}", way.method, way.work, way.called, *measured)
 
 
-def write_picture() -> None:
-    """Draw the README's second picture from the kept tables."""
-    figure = draw(energy_gains.energy_gains, tables())
-    assert isinstance(figure, Figure)
-    ENERGY_PICTURE.write_text(standalone(figure), encoding="utf-8")
+def made_motion(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
+    """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts and impacts."""
+    loaded = load_scene(find_scene(scene))
+    resolved = loaded.resolved()
+    start = np.concatenate([np.asarray(body["position"], dtype=float) for body in resolved["bodies"]])
+    time = np.arange(STEPS + 1) / 512
+    swing = 0.002 * np.sin(np.outer(40 * time, 1 + 0.1 * seed + np.arange(len(start))))
+    pose = mechanism_of(loaded).poses(start + swing, planar=True)
+    run = make_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, pose=pose,
+                   scene_name=scene, scene_resolved=resolved)
+    late = np.where(np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets)  # nothing touches before
+    run = replace(run, contacts=replace(run.contacts, offsets=late, point=0.01 * run.contacts.point))
+    return replace(run, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
 
 
-def _text(table: Table) -> str:
-    most = _KEPT if len(table.rows) > _LONG else len(table.rows)
-    groups: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
-    for row in table.rows:
-        groups.setdefault(tuple(cell for cell in row if isinstance(cell, str)), []).append(row)
-    thinned = [row for group in groups.values() for row in group[:: -(-len(group) // most)]]
-    columns = [[column.key, column.unit, column.heading] for column in table.columns]
-    rows = ",\n".join(json.dumps([_rounded(cell) for cell in row], ensure_ascii=False) for row in thinned)
-    return f'{{"columns": {json.dumps(columns, ensure_ascii=False)}, "rows": [\n{rows}]}}'
-
-
-def _rounded(cell: Any) -> Any:
-    value = cell.item() if hasattr(cell, "item") else cell
-    return float(f"{value:.3g}") if isinstance(value, float) else value
-
-
-if __name__ == "__main__":
-    from reports.evidence.gather import gather
-    from reports.pages.builder import figure_inputs
-
-    write_tables(figure_inputs(gather(Path(sys.argv[1]), "quick", lambda *_: None)))
-    write_picture()
+def all_inputs(make_run: Callable[..., Run]) -> dict[str, Any]:
+    """Return the inputs of all figures but those of scenes in space and of some films: made-up motions and tables."""
+    needed = sorted({name for recipe in RECIPES for name in recipe.needs})
+    scenes = {"corner": "peg_corner", "device": "peg_corner", "hole": "peg_hole", "group": "arm_pushing"}
+    runs = {name: made_motion(make_run, scenes[name.split("/")[0]], k) for k, name in enumerate(needed)
+            if name.split("/")[0] in scenes}  # fmt: skip
+    given = {name: load_scene(find_scene(name[6:])).resolved() for name in needed if name.startswith("scene/")}
+    return {**runs, **given, **tables(), "arm_energies": arm_energies(), "machine": "a processor, report of today"}

@@ -1,23 +1,36 @@
-"""Figures: the numbers of Figure 3, drawings that repeat byte for byte and can stand inside a page."""
+"""Figures, each drawn once from made-up inputs: bytes, colours, names at curves, and the numbers of Figure 3.
+
+One colour and one marker per world and per method in every figure; at most six series in a plot, each named at its
+curve. The tests read what was drawn: every call of matplotlib, every panel, every legend.
+"""
 
 from __future__ import annotations
 
+import ast
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
-from iapb import load_scene
+import reports.figures
 from iapb.run import Run
-from iapb.scene import find_scene
-from reports.figures import RECIPES, energy_gains
+from reports.figures import RECIPES, corner, energy_gains, plot
 from reports.figures.condition_map import condition_map
+from reports.figures.corner import penetration_over_time
 from reports.figures.figure import Figure, NotComputed, Recipe, draw
+from reports.figures.labels import name_curves
 from reports.figures.numbers import format_cell, format_number
-from reports.figures.style import CYCLE, VARIABLES
+from reports.figures.style import CYCLE, LOOKS, STYLES, VARIABLES, LineStyle
+from reports.figures.svg import to_svg
 from reports.figures.two_link_arm import arm_energies
-from tests.reports.figure_inputs import tables
+from tests.reports.figure_inputs import all_inputs
+from tests.reports.test_figure_labels import crossed
 from verification.finding import titled
 
 GAINS = titled(
@@ -27,22 +40,90 @@ GAINS = titled(
 )
 
 
-@pytest.fixture(scope="module")
-def inputs() -> dict[str, object]:
-    """What the recipes ask for, but for some films: two short runs stand for all the runs, the tables are real."""
-    from iapb.contact.laws import ImpulseAugmented
-    from iapb.haptics.coupling import FourChannel
-    from iapb.simulation import simulate
+MOST_SERIES = 6
+# modules that choose colours themselves -> why those are no series
+OWN_COLOURS = {
+    "style": "the table itself",
+    "film": "marks of contacts", "stability": "marks of a verdict", "complementarity": "marks of a verdict",
+    "engine_errors": "cells of a table", "cost": "cells of a table", "scenes_ledger": "layers of energy",
+    "fig05_couplings": "wires of a diagram", "two_link_arm": "arrows of a drawing",
+    "scenes_plane": "arrows of a drawing", "mechanics": "bounds without a mark",
+}  # fmt: skip
+COLOURS = {"BLUE", "VERMILION", "GREEN", "PURPLE", "AMBER", "SKY"}
 
-    scene = load_scene(find_scene("peg_corner"))
-    gains = scene.couplings.four_channel
-    coupling = FourChannel(tuple(gains.stiffness), tuple(gains.damping))
-    run = simulate(scene, ImpulseAugmented(), coupling, world="IAPB", steps=400)
-    group = simulate(load_scene(find_scene("arm_pushing")), ImpulseAugmented(), world="IAPB", steps=600)
-    names = {name for recipe in RECIPES for name in recipe.needs}
-    given: dict[str, object] = {name: run for name in names if name.startswith(("corner/", "device/"))}
-    given |= {name: load_scene(find_scene(name[6:])).resolved() for name in names if name.startswith("scene/")}
-    return given | tables() | {"arm_energies": arm_energies(), "group/IAPB": group, "machine": "a processor"}
+
+class Drawn(NamedTuple):
+    """One line as matplotlib was asked to draw it."""
+
+    figure: str
+    name: str
+    color: str
+    marker: str
+    joined: bool
+
+
+def _name(line: Any) -> str:
+    return str(line.get_gid()).removeprefix("curve=") if str(line.get_gid()).startswith("curve=") else ""
+
+
+def recorded(patch: pytest.MonkeyPatch, lines: list[Drawn], figure: list[str]) -> None:
+    """Write down every line that is plotted."""
+    plot = Axes.plot
+
+    def noted(self: Axes, *args: Any, **how: Any) -> Any:
+        made = plot(self, *args, **how)
+        lines.extend(Drawn(figure[0], _name(line), str(line.get_color()), str(line.get_marker()),
+                           line.get_linestyle() != "None") for line in made)  # fmt: skip
+        return made
+
+    patch.setattr(Axes, "plot", noted)
+
+
+def strangers(lines: list[Drawn]) -> list[Drawn]:
+    """Return the lines with a look that is not that of their name, or with a world's look and not its name."""
+    worlds = {(look.color, look.marker): names for names, look in LOOKS[:7] if look.marker}
+    wrong = []
+    for line in lines:
+        own = STYLES.get(line.name)
+        other = own is not None and (line.color != own.color or line.marker not in (own.marker, "", "None"))
+        known = worlds.get((line.color, line.marker))
+        taken = known is not None and line.joined and line.name not in known
+        taken = taken and (own is None or (own.color, own.marker) != (line.color, line.marker))
+        if other or taken:
+            wrong.append(line)
+    return wrong
+
+
+class Gallery(NamedTuple):
+    """All figures, every line that was drawn for them, and (figure, name at a curve, line that runs through it)."""
+
+    inputs: dict[str, Any]
+    figures: dict[str, Figure | NotComputed]
+    lines: list[Drawn]
+    struck: list[tuple[str, str, str]]
+
+    @property
+    def drawn(self) -> list[Figure]:
+        """The figures that had their inputs."""
+        return [figure for figure in self.figures.values() if isinstance(figure, Figure)]
+
+
+@pytest.fixture(scope="module")
+def gallery(make_run: Callable[..., Run]) -> Gallery:
+    """Every figure, drawn once."""
+    made, key = Gallery(all_inputs(make_run), {}, [], []), [""]
+    with pytest.MonkeyPatch.context() as patch:
+        recorded(patch, made.lines, key)
+
+        def named(axes: Axes, *words: Any) -> None:
+            name_curves(axes, *words)
+            made.struck.extend((key[0], *each) for each in crossed(axes))
+
+        patch.setattr(plot, "name_curves", named)
+        for recipe in RECIPES:
+            key[0] = recipe.key
+            made.figures[recipe.key] = draw(recipe, made.inputs)
+    return made
 
 
 @pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.key)
@@ -50,18 +131,85 @@ def recipe(request: pytest.FixtureRequest) -> Recipe:
     return request.param
 
 
-@pytest.fixture(scope="module")
-def figures(inputs: dict[str, object]) -> dict[str, Figure | NotComputed]:
-    return {recipe.key: draw(recipe, inputs) for recipe in RECIPES}
-
-
 @pytest.fixture
-def figure(recipe: Recipe, figures: dict[str, Figure | NotComputed]) -> Figure:
-    """The recipe's figure, drawn once."""
-    drawn = figures[recipe.key]
+def figure(recipe: Recipe, gallery: Gallery) -> Figure:
+    """The recipe's figure."""
+    drawn = gallery.figures[recipe.key]
     if isinstance(drawn, NotComputed):
-        pytest.skip(f"the fixture has no {drawn.missing}")
+        pytest.skip(f"no made-up {drawn.missing}")
     return drawn
+
+
+def test_all_figures_but_drawings_and_bars_are_drawn(gallery: Gallery) -> None:
+    drawn = {figure.key for figure in gallery.drawn}
+    drawings = {"fig01", "fig02", "fig04", "fig05", "scenes", "scenes-space"}
+    absent = {recipe.key for recipe in RECIPES if not recipe.key.startswith("film-")} - drawn
+    assert absent <= drawings
+
+
+def test_no_line_runs_through_a_name(gallery: Gallery) -> None:
+    assert len(gallery.drawn) > 20
+    assert gallery.struck == []
+
+
+def test_the_way_of_time_is_drawn_on_paths_of_the_hand(gallery: Gallery) -> None:
+    panels = [(figure.key, panel) for figure in gallery.drawn for panel in figure.panels]
+    paths = {key: panel.svg for key, panel in panels if "path of the hand" in panel.label}
+    assert set(paths) == {"hero", "fig07", "fig09", "fig10", "fig12"}
+    assert all(">time</text>" in svg for svg in paths.values())
+
+
+def test_no_two_rows_of_the_table_look_alike() -> None:
+    looks = [(look.color, look.marker, look.filled) for _, look in LOOKS]
+    assert len(set(looks)) == len(looks)
+    names = [name for row, _ in LOOKS for name in row]
+    assert len(set(names)) == len(names)
+    assert not {(look.color, look.marker) for look in CYCLE} & {(look.color, look.marker) for _, look in LOOKS[:7]}
+
+
+def test_a_name_has_one_colour_and_one_marker_in_every_figure(gallery: Gallery) -> None:
+    assert strangers(gallery.lines) == []
+    assert {line.name for line in gallery.lines} >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "Lemke", "daqp",
+                                             "printed, numpy"}
+    for figure in gallery.drawn:
+        for text, look in figure.legend:
+            assert look.color == STYLES.get(text, look).color and look.marker == STYLES.get(text, look).marker, text
+
+
+@pytest.mark.parametrize("name", ["IAPB LM", ""])
+def test_a_figure_in_another_worlds_look_is_noticed(
+    name: str, gallery: Gallery, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As Figure 9 was: its saturated curve in the look of PB."""
+    lines: list[Drawn] = []
+    recorded(monkeypatch, lines, ["fig12"])
+    planted = LineStyle(STYLES["PB"].color, STYLES["PB"].marker, name=name)
+    monkeypatch.setattr(corner, "STYLES", STYLES | {"IAPB LM": planted})
+    draw(next(recipe for recipe in RECIPES if recipe.key == "fig12"), gallery.inputs)
+    assert {line.name for line in strangers(lines)} == {name}
+
+
+def test_a_plot_has_at_most_six_series_each_named_at_its_curve(gallery: Gallery) -> None:
+    checked = 0
+    for figure in gallery.drawn:
+        for panel in figure.panels:
+            names = list(dict.fromkeys(re.findall(r'data-curve="([^"]+)"', panel.svg)))
+            assert len(names) <= MOST_SERIES, (figure.key, panel.label, names)
+            written = re.findall(r">([^<>]+)</text>", panel.svg)
+            for name in names if len(names) > 1 else ():
+                assert any(text.startswith(name) for text in written), (figure.key, panel.label, name)
+                checked += 1
+    assert checked > 100
+
+
+@pytest.mark.parametrize("path", sorted(Path(reports.figures.__file__).parent.glob("*.py")), ids=lambda path: path.stem)
+def test_a_module_takes_its_series_from_the_table(path: Path) -> None:
+    """Only `OWN_COLOURS` name a colour or make a look: marks of verdicts, cells and drawings."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    made = [node.lineno for node in nodes
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "LineStyle"]  # fmt: skip
+    named = {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names} & COLOURS
+    assert bool(made or named) == (path.stem in OWN_COLOURS), (made, named)
 
 
 def test_figure_3_has_the_energies_that_follow_from_the_geometry() -> None:
@@ -83,10 +231,10 @@ def test_figure_3_loses_in_proportion_to_one_minus_e_squared() -> None:
             np.testing.assert_allclose(lost, share * lost[0], atol=1e-13)
 
 
-def test_a_drawing_repeats_byte_for_byte(recipe: Recipe, figure: Figure, inputs: dict[str, object]) -> None:
-    again = draw(recipe, inputs)
-    assert isinstance(again, Figure)
-    assert [panel.svg for panel in figure.panels] == [panel.svg for panel in again.panels]
+@pytest.mark.parametrize("key", ["hero", "fig05", "every-scene", "film-hole", "effect-costs"])
+def test_a_drawing_repeats_byte_for_byte(key: str, gallery: Gallery) -> None:
+    again = draw(next(recipe for recipe in RECIPES if recipe.key == key), gallery.inputs)
+    assert isinstance(again, Figure) and again.panels == gallery.figures[key].panels  # type: ignore[union-attr]
 
 
 def test_a_drawing_is_a_whole_svg_that_asks_for_nothing(figure: Figure) -> None:
@@ -140,10 +288,6 @@ def test_rounding_coordinates_leaves_the_numbers_on_the_axes_alone() -> None:
 
 
 def test_markers_of_one_style_say_it_once_and_every_one_of_another_keeps_its_own() -> None:
-    from matplotlib.figure import Figure as Drawing
-
-    from reports.figures.svg import to_svg
-
     drawing = Drawing()
     axes = drawing.subplots()
     axes.scatter(range(20), range(20), color=["#112233"] * 10 + ["#445566"] * 10)
@@ -174,10 +318,8 @@ def test_cells(value: object, text: str) -> None:
     assert format_cell(value) == text
 
 
-def test_penetration_is_that_of_the_deepest_contact(inputs: dict[str, object]) -> None:
-    from reports.figures.corner import penetration_over_time
-
-    run = inputs["corner/IAPB"]
+def test_penetration_is_that_of_the_deepest_contact(gallery: Gallery) -> None:
+    run = gallery.inputs["corner/IAPB"]
     assert isinstance(run, Run)
     depth = penetration_over_time(run)
     rows = run.contacts

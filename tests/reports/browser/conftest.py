@@ -8,21 +8,19 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from iapb import find_scene, load_scene
 from iapb.run import Run
-from iapb.scene.mechanism import mechanism_of
 from reports.figures import RECIPES
 from reports.figures.two_link_arm import arm_energies
 from reports.pages.builder import build_report
 from reports.pages.records import Evidence
 from reports.report import write_report
+from tests.reports.figure_inputs import made_motion
 from verification.finding import MIXED, REPRODUCED, Part, finding_of, titled
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -31,7 +29,6 @@ ARGUMENTS = (
     "--disable-component-update", "--disable-sync",
 )  # fmt: skip
 DESK, PHONE = (1400, 900), (400, 800)
-STEPS, UNTOUCHED = 128, 40
 FIGURES = ("fig07", "fig08", "film-corner", "film-hole", "fig03")
 
 
@@ -82,21 +79,6 @@ def opened(started: Any, path: Path, size: tuple[int, int] = DESK, **context: An
     sight.page.goto(own)
     yield sight
     room.close()
-
-
-def made_motion(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
-    """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts and impacts."""
-    loaded = load_scene(find_scene(scene))
-    resolved = loaded.resolved()
-    start = np.concatenate([np.asarray(body["position"], dtype=float) for body in resolved["bodies"]])
-    time = np.arange(STEPS + 1) / 512
-    swing = 0.002 * np.sin(np.outer(40 * time, 1 + 0.1 * seed + np.arange(len(start))))
-    pose = mechanism_of(loaded).poses(start + swing, planar=True)
-    run = make_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, pose=pose,
-                   scene_name=scene, scene_resolved=resolved)
-    late = np.where(np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets)  # nothing touches before
-    run = replace(run, contacts=replace(run.contacts, offsets=late, point=0.01 * run.contacts.point))
-    return replace(run, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
 
 
 @pytest.fixture(scope="session")
