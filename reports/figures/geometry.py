@@ -1,8 +1,8 @@
-"""The outlines of a scene, computed from its resolved file and the poses of a run, and their projection to a picture.
+"""The outlines and solids of a scene, from its resolved file and the poses of a run: for pictures, films, the browser.
 
-A planar scene lies in the plane z = 0. Its outlines are (n, 2) arrays of corners, those of a scene in space (n, 3) [m].
-The view is axonometric: parallel lines stay parallel and sizes do not depend on the distance. Quaternions are x, y, z,
-w; rpy rotates about the fixed x, y and z axes in this order.
+A planar scene lies in the plane z = 0. Its outlines are (n, 2) arrays of corners; its solids are a tenth of the scene's
+size thick. The view of pictures is axonometric: parallel lines stay parallel and sizes do not depend on the distance.
+Quaternions of a run are x, y, z, w; rpy rotates about the fixed x, y and z axes in this order.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from iapb.scene.mechanism import mechanism_of, start_of
 from iapb.scene.model import scene_kind
@@ -20,9 +21,9 @@ from iapb.scene.model import scene_kind
 Floats = NDArray[np.float64]
 WORLD = "world"
 _CIRCLE_CORNERS, _BALL_CORNERS = 72, 48
-_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float) / 2.0
-# corners in a ring, counter-clockwise from outside
-_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+_THICKNESS = 0.1  # of planar shapes, as a share of the scene's size
+_REACH = 3.0  # of walls without end, as a multiple of the scene's size
+_RINGS = 12  # of a ball, from pole to pole
 
 
 def is_spatial(scene: Mapping[str, Any]) -> bool:
@@ -49,35 +50,29 @@ class Placement:
 
 def placement(origin: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0)) -> Placement:
     """Return the frame at `origin` (2 or 3 numbers), rotated by roll, pitch and yaw."""
-    from scipy.spatial.transform import Rotation
-
     return Placement(Rotation.from_euler("xyz", rpy).as_matrix(), np.resize(np.append(origin, 0.0), 3))
 
 
-def placement_of(placed: Mapping[str, Any], origin: str = "center") -> Placement:
-    """Return the frame of a shape or joint of a resolved scene, from its `angle` (plane) or its `rpy` (space)."""
-    return placement(placed.get(origin, (0.0, 0.0)), placed.get("rpy", (0.0, 0.0, placed.get("angle", 0.0))))
-
-
-def start_pose(scene: Mapping[str, Any]) -> Floats:
-    """Return the initial poses (bodies, 3 or 7) of a resolved scene, as computed by the engine."""
-    checked = scene_kind(scene).model_validate(scene)
-    poses: Floats = mechanism_of(checked).poses(start_of(checked)[0][None], planar=not is_spatial(scene))[0]
-    return poses
+def placement_of(shape: Mapping[str, Any]) -> Placement:
+    """Return the frame of a shape of a resolved scene, from its `angle` (plane) or its `rpy` (space)."""
+    return placement(shape.get("center", (0.0, 0.0)), shape.get("rpy", (0.0, 0.0, shape.get("angle", 0.0))))
 
 
 def body_placements(scene: Mapping[str, Any], pose: Floats | None = None) -> dict[str, Placement]:
     """Return the placement of every body, at a pose (bodies, 3 or 7) of a run or at the start of the scene."""
-    poses = start_pose(scene) if pose is None else pose
-    return {body["name"]: _placed(one) for body, one in zip(scene["bodies"], poses, strict=True)}
+    if pose is None:
+        checked = scene_kind(scene).model_validate(scene)
+        pose = mechanism_of(checked).poses(start_of(checked)[0][None], planar=not is_spatial(scene))[0]
+    turns = Rotation.from_quat(pose[:, 3:]) if is_spatial(scene) else Rotation.from_rotvec(pose[:, 2:] * [0, 0, 1])
+    origins = pose[:, :3] * [1.0, 1.0, is_spatial(scene)]
+    return {body["name"]: Placement(turn, origin) for body, turn, origin in
+            zip(scene["bodies"], turns.as_matrix(), origins, strict=True)}  # fmt: skip
 
 
-def _placed(pose: Floats) -> Placement:
-    if len(pose) == 3:
-        return placement(pose[:2], (0.0, 0.0, pose[2]))
-    from scipy.spatial.transform import Rotation
-
-    return Placement(Rotation.from_quat(pose[3:]).as_matrix(), np.array(pose[:3]))
+def held_point(scene: Mapping[str, Any], pose: Floats) -> Floats | None:
+    """Return the point (3,) [m] at which the hand holds the tool; None in a scene without a hand."""
+    hand = scene.get("hand")
+    return None if hand is None else body_placements(scene, pose)[hand["body"]].of(np.resize([*hand["point"], 0.0], 3))
 
 
 # In the plane
@@ -119,13 +114,99 @@ def bounds(points: Sequence[Floats], margin: float) -> tuple[Floats, Floats]:
     return low - margin * max(high - low), high + margin * max(high - low)
 
 
-# In space
+# Solids
 
 
-def cuboid_faces(frame: Placement, size: Any) -> tuple[Floats, ...]:
-    """Return the six faces of a box as rings of corners (4, 3), counter-clockwise seen from outside."""
-    corners = frame.of(_CORNERS * np.asarray(size, dtype=float))
-    return tuple(corners[list(ring)] for ring in _FACES)
+@dataclass(frozen=True)
+class Solid:
+    """A shape in the frame of its body ("" is the world): corners (n, 3) [m], and its sides as rings of corners.
+
+    Rings are counter-clockwise seen from outside.
+    """
+
+    body: str
+    vertices: Floats
+    rings: Sequence[Sequence[int]]
+
+    @property
+    def sides(self) -> list[Floats]:
+        """The corners (n, 3) of each ring."""
+        return [self.vertices[list(ring)] for ring in self.rings]
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """Triangles (m, 3) of corners that fill the rings."""
+        return np.array([(ring[0], ring[k], ring[k + 1]) for ring in self.rings for k in range(1, len(ring) - 1)])
+
+
+def prism(body: str, corners: Floats, low: float, high: float, frame: Placement | None = None) -> Solid:
+    """Return the prism over a convex outline (n, 2), from height `low` to `high` of its frame."""
+    turned = np.roll(corners, -1, axis=0)
+    if np.sum(corners[:, 0] * turned[:, 1] - corners[:, 1] * turned[:, 0]) < 0.0:
+        corners = corners[::-1]
+    n = len(corners)
+    vertices = np.vstack([np.column_stack([corners, np.full(n, height)]) for height in (low, high)])
+    sides = [(k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n)]
+    rings = [tuple(range(n, 2 * n)), tuple(reversed(range(n))), *sides]
+    return Solid(body, vertices if frame is None else frame.of(vertices), rings)
+
+
+def cuboid(body: str, frame: Placement, size: Any) -> Solid:
+    """Return a box around the origin of its frame."""
+    x, y, z = np.asarray(size, dtype=float) / 2.0
+    return prism(body, np.array([[x, y], [-x, y], [-x, -y], [x, -y]]), -z, z, frame)
+
+
+def plane_frame(wall: Mapping[str, Any]) -> Placement:
+    """Return a frame on the plane of a half-space, with z along its normal."""
+    normal = np.asarray(wall["normal"], dtype=float) / np.linalg.norm(wall["normal"])
+    along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    along = along / np.linalg.norm(along)
+    return Placement(np.column_stack([along, np.cross(normal, along), normal]), np.asarray(wall["point"], dtype=float))
+
+
+def _ball(body: str, center: Any, radius: float) -> Solid:
+    """Return a sphere with corners on circles of latitude and longitude."""
+    n = 2 * _RINGS
+    t, p = np.meshgrid(np.linspace(0.0, np.pi, _RINGS + 1), np.linspace(0.0, 2.0 * np.pi, n, endpoint=False),
+                       indexing="ij")  # fmt: skip
+    points = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
+    rings = [(i * n + j, (i + 1) * n + j, (i + 1) * n + (j + 1) % n, i * n + (j + 1) % n)
+             for i in range(_RINGS) for j in range(n)]  # fmt: skip
+    return Solid(body, np.asarray(center, dtype=float) + radius * points, rings)
+
+
+def solids(scene: Mapping[str, Any], size: float | None = None) -> Iterator[Solid]:
+    """Yield every shape of a resolved scene of the given size [m], by default that of its extent."""
+    if size is None:
+        size = float(np.linalg.norm(np.subtract(*extent(scene))))
+    owned = [(body["name"], shape) for body in scene["bodies"] for shape in body["shapes"]]
+    for name, shape in owned + [("", wall) for wall in scene["walls"]]:
+        half = 0.5 * _THICKNESS * size
+        if shape["kind"] == "half_plane":
+            yield prism(name, half_plane(shape, _REACH * size), -0.9 * half, 0.9 * half)
+        elif shape["kind"] == "half_space":
+            reach = 0.5 * _REACH * size
+            square = reach * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+            yield prism(name, square, -0.04 * reach, 0.0, plane_frame(shape))
+        elif shape["kind"] == "sphere":
+            yield _ball(name, shape["center"], shape["radius"])
+        elif is_spatial(scene):
+            yield cuboid(name, placement_of(shape), shape["size"])
+        else:
+            yield prism(name, outline(shape), -half, half)
+
+
+def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
+    """Return the lower and upper corner (3,) [m] of all bounded shapes in the initial state."""
+    places = {"": placement(), **body_placements(scene)}
+    bounded = solids({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0)
+    every = np.vstack([place.origin for name, place in places.items() if name]
+                      + [places[solid.body].of(solid.vertices) for solid in bounded])  # fmt: skip
+    return every.min(axis=0), every.max(axis=0)
+
+
+# The view of pictures in space
 
 
 def cuboid_of_inertia(body: Mapping[str, Any]) -> Floats:

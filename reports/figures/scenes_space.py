@@ -13,12 +13,15 @@ from reports.figures.canvas import Canvas, hand
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.geometry import (
     Floats,
+    Placement,
     View,
     body_placements,
-    cuboid_faces,
+    cuboid,
     cuboid_of_inertia,
     links,
     placement,
+    placement_of,
+    plane_frame,
     view,
 )
 from reports.figures.style import FORCE, INK, LINK, MUTED, PANEL, PEG, RULE, WALL
@@ -83,7 +86,13 @@ def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
     for step, each in zip(steps, drawn, strict=True):
         with Canvas(f"scenes-space-{run.scene_name}-{step}", low, high, PANEL) as canvas:
             for order, piece in enumerate(each):
-                _fill(canvas.axes, sight.seen, piece, order)
+                flat, over = sight.seen.flat(piece.points), {"zorder": 2 + 1e-3 * order}
+                if len(flat) == 2:
+                    canvas.axes.plot(*flat.T, color=piece.edge, linewidth=piece.width, **over)
+                    continue
+                canvas.axes.fill(*flat.T, facecolor=piece.face, edgecolor="none", alpha=piece.alpha, **over)
+                canvas.axes.fill(*flat.T, facecolor="none", edgecolor=piece.edge, linewidth=piece.width,
+                                 joinstyle="round", **over)  # fmt: skip
             if scene["hand"]:
                 place = body_placements(scene, run.pose[step])[scene["hand"]["body"]]
                 hand(canvas.axes, scene, place, 0.16 * float(max(high - low)), sight.seen.flat)
@@ -91,21 +100,16 @@ def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
         yield Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.", f"{run.scene_name}, {moment}")
 
 
-def _fill(axes: Any, seen: View, piece: Piece, order: int) -> None:
-    flat = seen.flat(piece.points)
-    if len(flat) == 2:
-        axes.plot(*flat.T, color=piece.edge, linewidth=piece.width, zorder=2 + 1e-3 * order)
-    else:
-        axes.fill(*flat.T, facecolor=piece.face, edgecolor="none", alpha=piece.alpha, zorder=2 + 1e-3 * order)
-        axes.fill(*flat.T, facecolor="none", edgecolor=piece.edge, linewidth=piece.width, joinstyle="round",
-                  zorder=2 + 1e-3 * order)  # fmt: skip
-
-
 def pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Piece]:
     """Yield the faces, discs and lines of a scene at a pose that face the reader."""
     seen = sight.seen
     for wall in scene["walls"]:
-        yield from _wall(sight, wall)
+        if wall["kind"] != "half_space":
+            yield from _shape(seen, placement(), _cut(wall, sight.walls_around), WALL, MUTED, _WALL_SHOWS)
+        elif sight.floor:  # a square, moved to the reach of an arm, x > 0
+            square = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+            yield Piece(plane_frame(wall).of(sight.floor * square) + [0.7 * sight.floor, 0.0, 0.0], RULE, MUTED, 0.6,
+                        -np.inf)  # fmt: skip
     places = body_placements(scene, pose)
     for line in links(scene, pose):
         yield Piece(np.array(line), "none", LINK, _LINK_WIDTH, seen.depth(line))
@@ -114,27 +118,9 @@ def pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Pie
         for shape in body["shapes"]:
             yield from _shape(seen, frame, shape)
         if not body["shapes"] and body["joint"] == "free_flyer":
-            box = {"kind": "box", "size": cuboid_of_inertia(body), "center": body["center_of_mass"], "rpy": (0, 0, 0)}
-            yield from _shape(seen, frame, box)
-            corner = frame.of(np.asarray(box["center"]) + np.asarray(box["size"]) / 2.0)
-            yield Piece(seen.disc(corner, _MARK * max(box["size"])), FORCE, FORCE, 0.5, np.inf)
-
-
-def _wall(sight: Sight, wall: Mapping[str, Any]) -> Iterator[Piece]:
-    if wall["kind"] != "half_space":
-        yield from _shape(sight.seen, placement(), _cut(wall, sight.walls_around), WALL, MUTED, _WALL_SHOWS)
-    elif sight.floor:
-        normal = np.asarray(wall["normal"], dtype=float) / np.linalg.norm(wall["normal"])
-        along = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-        along = along / np.linalg.norm(along)
-        side, point = np.cross(normal, along), np.asarray(wall["point"], dtype=float)
-        sides = sight.floor * np.array([along + side, side - along, -along - side, along - side])
-        yield Piece(point + sides + _onwards(sight), RULE, MUTED, 0.6, -np.inf)
-
-
-def _onwards(sight: Sight) -> Floats:
-    """Return the shift that moves a floor to the reach of an arm, x > 0."""
-    return np.array([0.7 * sight.floor, 0.0, 0.0])
+            size, center = cuboid_of_inertia(body), np.asarray(body["center_of_mass"], dtype=float)
+            yield from _shape(seen, frame, {"kind": "box", "size": size, "center": center})
+            yield Piece(seen.disc(frame.of(center + size / 2.0), _MARK * max(size)), FORCE, FORCE, 0.5, np.inf)
 
 
 def _cut(wall: Mapping[str, Any], reach: float) -> Mapping[str, Any]:
@@ -147,13 +133,10 @@ def _cut(wall: Mapping[str, Any], reach: float) -> Mapping[str, Any]:
     return {**wall, "size": high - low, "center": (low + high) / 2.0}
 
 
-def _shape(seen: View, frame: Any, shape: Mapping[str, Any], face: str = PEG, edge: str = INK,
+def _shape(seen: View, frame: Placement, shape: Mapping[str, Any], face: str = PEG, edge: str = INK,
            alpha: float = _BODY_SHOWS) -> Iterator[Piece]:  # fmt: skip
-    own = frame @ placement(shape["center"], shape.get("rpy", (0.0, 0.0, 0.0)))
-    middle = seen.depth(own.origin)
-    if shape["kind"] == "sphere":
-        yield Piece(seen.disc(own.origin, shape["radius"]), face, edge, 0.9, middle, alpha)
-        return
-    for ring in cuboid_faces(own, shape["size"]):
-        if seen.faces_reader(ring):
-            yield Piece(ring, face, edge, 0.9, middle, alpha)
+    own = frame @ placement_of(shape)
+    rings = [seen.disc(own.origin, shape["radius"])] if shape["kind"] == "sphere" else [
+        ring for ring in cuboid("", own, shape["size"]).sides if seen.faces_reader(ring)]  # fmt: skip
+    for ring in rings:
+        yield Piece(ring, face, edge, 0.9, seen.depth(own.origin), alpha)

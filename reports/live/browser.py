@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from reports.figures.canvas import is_turned
-from reports.figures.geometry import is_spatial
-from reports.live.picture import extent, held_point, pieces, placements
+from reports.figures.geometry import body_placements, extent, held_point, is_spatial, solids
 from reports.live.window import Window
 
 Floats = NDArray[np.float64]
@@ -65,8 +65,9 @@ def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection,
         if pose is not None and np.all(np.isfinite(pose)):
             pose = pose.reshape(len(scene["bodies"]), -1)
             with server.atomic():
-                for name, (quaternion, position) in placements(scene, pose).items():
-                    frames[name].wxyz, frames[name].position = quaternion, position
+                for name, place in body_placements(scene, pose).items():
+                    frames[name].wxyz = Rotation.from_matrix(place.rotation).as_quat(scalar_first=True)
+                    frames[name].position = place.origin
                 mouse.follow(pose)
         window.want(mouse.target_at(time.monotonic()), time.monotonic())
         time.sleep(max(0.0, started + 1.0 / FRAMES_PER_SECOND - time.monotonic()))
@@ -120,7 +121,7 @@ def _draw(server: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
     """Add every shape below the frame of its body; return the frames."""
     frames = {body["name"]: server.scene.add_frame(f"/{body['name']}", show_axes=False) for body in scene["bodies"]}
     held = (scene.get("hand") or {}).get("body")
-    for number, piece in enumerate(pieces(scene)):
+    for number, piece in enumerate(solids(scene)):
         color = _WALL if not piece.body else _TOOL if piece.body == held else _BODY
         server.scene.add_mesh_simple(f"/{piece.body or 'world'}/shape{number}", piece.vertices.astype(np.float32),
                                      piece.faces.astype(np.uint32), color=color, flat_shading=True, side="double")

@@ -16,7 +16,7 @@ from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
 from reports.evidence.runs import FIGURE_RUNS
 from reports.figures import scenes_ledger, scenes_space
-from reports.figures.geometry import body_placements, cuboid_faces, cuboid_of_inertia, placement, view
+from reports.figures.geometry import body_placements, cuboid, cuboid_of_inertia, placement, view
 from verification.finding import MIXED, REFUTED, REPRODUCED, Finding, finding_of
 from verification.scenes import ledger
 from verification.scenes.books import OpenBooks
@@ -99,8 +99,8 @@ def test_outlines_stand_where_the_engine_has_the_bodies(runs: tuple[Run, ...], n
 
 
 def test_half_of_a_box_is_seen() -> None:
-    faces = cuboid_faces(placement((1, 2, 3), (0.3, -0.2, 0.9)), (1, 2, 3))
-    assert sum(view(0.7, 0.4).faces_reader(ring) for ring in faces) == 3
+    box = cuboid("", placement((1, 2, 3), (0.3, -0.2, 0.9)), (1, 2, 3))
+    assert len(box.sides) == 6 and sum(view(0.7, 0.4).faces_reader(ring) for ring in box.sides) == 3
 
 
 def test_the_box_of_an_inertia_has_that_inertia() -> None:

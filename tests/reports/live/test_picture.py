@@ -7,20 +7,13 @@ import pytest
 
 from iapb.scene import find_scene, load_scene, scene_names
 from iapb.system import System
-from reports.figures.geometry import is_spatial
-from reports.live.picture import extent, held_point, pieces, placements
-
-
-def rotation_of(quaternion):
-    w, x, y, z = quaternion
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + 2 * w * cross + 2 * cross @ cross
+from reports.figures.geometry import body_placements, extent, held_point, is_spatial, solids
 
 
 @pytest.mark.parametrize("name", scene_names())
 def test_every_piece_is_closed_and_its_outside_is_out(name):
     scene = load_scene(find_scene(name)).resolved()
-    for piece in pieces(scene):
+    for piece in solids(scene):
         edges = {(face[i], face[i - 2]) for face in piece.faces.tolist() for i in range(3)}
         corners = piece.vertices[piece.faces] - piece.vertices.mean(axis=0)
         volumes = np.linalg.det(corners)
@@ -38,10 +31,10 @@ def test_bodies_are_where_the_engine_has_them(name):
     rotations, origins = mechanism.placements(q)
     resolved = scene.resolved()
     pose = mechanism.poses(q[None], planar=not is_spatial(resolved))[0]
-    for name, (quaternion, position) in placements(resolved, pose).items():
+    for name, place in body_placements(resolved, pose).items():
         body = mechanism.index(name)
-        assert position == pytest.approx(origins[body], abs=1e-12)
-        assert rotation_of(quaternion) == pytest.approx(rotations[body], abs=1e-12)
+        assert place.origin == pytest.approx(origins[body], abs=1e-12)
+        assert place.rotation == pytest.approx(rotations[body], abs=1e-12)
     if scene.hand is not None:
         body, point = mechanism.index(scene.hand.body), np.zeros(3)
         point[: len(scene.hand.point)] = scene.hand.point
