@@ -91,14 +91,16 @@ def _not_given() -> None:
 
 
 def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Turn KeyboardInterrupt into typer.Abort, which reaches `main`; typer itself would exit with 130 silently."""
+    """Give the answer of a command; turn KeyboardInterrupt into typer.Abort, which reaches `main`."""
 
     @wraps(command)
     def call(*arguments: Any, **options: Any) -> Any:
         try:
-            return command(*arguments, **options)
+            answer = command(*arguments, **options)
         except KeyboardInterrupt:
             raise typer.Abort from None
+        if answer is not None:
+            answer.give(options.get("json_", False))
 
     return call
 

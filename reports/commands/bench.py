@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 import re
 from datetime import date
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table as Printed
 
 from iapb.errors import ArgumentError
-from reports.commands.as_json import Json, facts_of
+from reports.commands.answer import Answer, Json
+from reports.commands.lines import sentence
 from reports.commands.progress import stage_progress
-from reports.figures.numbers import format_cell
 from reports.provenance import processor
 from verification.cost.impacts import choices, short_time, which_method, work_precision
 from verification.cost.study import haptic_study
-from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Table
+from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
 
 LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
 
@@ -31,47 +29,25 @@ def bench(
     contacts: Annotated[int, typer.Option("--contacts", help="Contacts of that impact.")] = 20,
     coordinates: Annotated[int, typer.Option("--coordinates", help="Coordinates of that impact.")] = 6,
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula."""
-    with facts_of(json_) as facts:
-        if budget:
-            _answer(seconds_of(budget), contacts, coordinates, facts)
-        else:
-            _measure(full, tables, facts)
-
-
-def _measure(full: bool, tables: bool, facts: dict[str, Any]) -> None:
+    if budget:
+        return _recommended(seconds_of(budget), contacts, coordinates)
     with stage_progress() as progress:
         topic = haptic_study("full" if full else "quick", progress)
         methods = work_precision(progress=lambda done, total: progress("methods on problems", done, total))
-    facts.update(processor=processor(), verdict=topic.verdict, parts=topic.parts, failures=topic.failures,
-                 tables={name: table.records() for name, table in topic.tables.items()} | {
-                     "methods on problems": methods.records()})
-    console = Console(width=max(140, Console().width))
-    for name, numbers in topic.tables.items():
-        if tables or name not in LONG:
-            _print(console, name.capitalize(), numbers)
-    _print(console, "Which method for a budget", choices(methods))
-    if tables:
-        _print(console, "What a microsecond buys", methods)
+    facts = {"processor": processor(), "verdict": topic.verdict, "parts": topic.parts, "failures": topic.failures,
+             "tables": {name: table.records() for name, table in topic.tables.items()} | {
+                 "methods on problems": methods.records()}}  # fmt: skip
+    shown = {name: table for name, table in topic.tables.items() if tables or name not in LONG}
+    shown |= {"which method for a budget": choices(methods)} | ({"methods on problems": methods} if tables else {})
+    lines = [line for name, table in shown.items() for line in (f"\n{name.capitalize()}", table, sentence(table.note))]
     words = {REPRODUCED: "as asked for", MIXED: "not as asked for", NOT_COMPUTED: "not measured"}
-    for part in topic.parts:
-        console.print(f"• {words[part.verdict]}: {part.sentence}", highlight=False, markup=False)
+    lines += ["", *(sentence(f"{words[part.verdict]}: {part.sentence}", "• ") for part in topic.parts)]
     if not tables:
-        console.print(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.", highlight=False)
-    if topic.failures:
-        for one in topic.failures:
-            print(f"Not computed: {one.case}: {one.error}: {one.reason}")
-        raise typer.Exit(1)
-
-
-def _print(console: Console, title: str, numbers: Table) -> None:
-    table = Printed(title=title, caption=numbers.note)
-    for heading in numbers.titles:
-        table.add_column(heading, overflow="fold")
-    for row in numbers.cells:
-        table.add_row(*(format_cell(value, numbers.digits) for value in row))
-    console.print(table)
+        lines.append(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.")
+    lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in topic.failures]
+    return Answer(facts, lines, 1 if topic.failures else 0)
 
 
 UNITS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0}
@@ -89,13 +65,11 @@ def seconds_of(text: str) -> float:
     return seconds
 
 
-def _answer(budget: float, contacts: int, coordinates: int, facts: dict[str, Any]) -> None:
-    """Print the recommended method in one sentence for each way of calling, and the machine of the measurement."""
+def _recommended(budget: float, contacts: int, coordinates: int) -> Answer:
+    """Return the recommended method in one sentence for each way of calling, and the machine of the measurement."""
     found = which_method(budget, contacts, coordinates)
-    facts.update(processor=processor(), choices=found)
-    for choice in found:
-        print(choice)
-    if not found:
-        print(f"In {short_time(budget)} no method solves {contacts} contacts on {coordinates} coordinates without a "
-              "gain of energy.")
-    print(f"Measured on {processor()}, {date.today()}, on nine hard impacts of this size.")
+    none = (f"In {short_time(budget)} no method solves {contacts} contacts on {coordinates} coordinates without a gain "
+            "of energy.")  # fmt: skip
+    return Answer({"processor": processor(), "choices": found}, [
+        *(map(str, found) if found else (none,)),
+        f"Measured on {processor()}, {date.today()}, on nine hard impacts of this size."])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, TextIO
@@ -15,7 +16,7 @@ from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
 from iapb.advice.certificate import EXPORT_HEAD, exported, exported_run
 from iapb.errors import ArgumentError, RunFileError
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Answer, Json
 from reports.commands.run import counted
 from reports.store.io import written_aside
 from reports.store.runs import read_run
@@ -29,18 +30,13 @@ def certify(
     export: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Write every impact as a line of integers, for the checker proved in Coq.")] = None,
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent."""
     paths = list(dict.fromkeys(path for given in files for path in _files(given)))
     found = _exported(paths, export) if export else {path: certificate_of(path) for path in paths}
     failed = [path for path, one in found.items() if not one.passed]
-    if json_:
-        judged = {path: asdict(one) | {"passed": one.passed, "words": one.words()} for path, one in found.items()}
-        print_json({"passed": not failed, "files": judged})
-    else:
-        _print(found, failed)
-    if failed:
-        raise typer.Exit(1)
+    judged = {path: asdict(one) | {"passed": one.passed, "words": one.words()} for path, one in found.items()}
+    return Answer({"passed": not failed, "files": judged}, list(_lines(found, failed)), 1 if failed else 0)
 
 
 def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
@@ -54,24 +50,24 @@ def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
     return found
 
 
-def _print(found: dict[Path, Certificate], failed: list[Path]) -> None:
-    """Print the certificate of each file: its residuals, how it was decided, and the first energy gain."""
+def _lines(found: dict[Path, Certificate], failed: list[Path]) -> Iterator[str]:
+    """Yield the certificate of each file: its residuals, how it was decided, and the first energy gain."""
     for path, one in found.items():
-        print(f"{path}: {one.words()}")
+        yield f"{path}: {one.words()}"
         residuals = {"M(v⁺ − v⁻) − impulse": one.momentum, "impulse − Jᵀp": one.span,
                      "sum of impulses": one.total, "restitution": one.restitution}
         sizes = [f"{name} {x:.1e}" for name, x in residuals.items() if not np.isnan(x)]
         if sizes:
-            print(f"  largest relative residuals: {', '.join(sizes)}")
+            yield f"  largest relative residuals: {', '.join(sizes)}"
         if one.impacts:
             decided = one.impacts - one.by_integers
-            print(f"  decided by a double-double error bound: {decided} (of these {one.checked} confirmed in exact "
+            yield (f"  decided by a double-double error bound: {decided} (of these {one.checked} confirmed in exact "
                   f"integer arithmetic); decided in exact integer arithmetic: {one.by_integers}")
     impacts, gains = sum(one.impacts for one in found.values()), sum(one.gains for one in found.values())
-    print(f"{counted(impacts, 'impact')} of {counted(len(found), 'file')}: {gains} gained energy (exact).")
+    yield f"{counted(impacts, 'impact')} of {counted(len(found), 'file')}: {gains} gained energy (exact)."
     for path in failed[:1]:
         if found[path].counterexample:
-            print(f"\nImpact {found[path].first_gain} of {path}:\n{found[path].counterexample}")
+            yield f"\nImpact {found[path].first_gain} of {path}:\n{found[path].counterexample}"
 
 
 def certificate_of(path: Path, export: TextIO | None = None) -> Certificate:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from iapb.advice.checks import Caution, Start, check_scene, settled, step_limits
-from iapb.scene import Scene
 from reference.worlds import find_world
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Answer, Json
 from reports.commands.run import DISTRUSTED, SceneName, Values, cost_in_words, scene_given
 
 
@@ -18,7 +17,7 @@ def check(
     world: Annotated[str, typer.Option(help="World of the run; see iapb run.")] = "IAPB",
     set_: Values = None,
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then."""
     source, remarks = settled(scene_given(scene, set_))
     law = find_world(world).law
@@ -30,22 +29,11 @@ def check(
         remarks = (*remarks, f"{source.name} in {world}: {said}")
     explicit = source.contact.forces == "paper"  # implicit contact has no such limits
     limits = step_limits(Start(source), getattr(law, "integrator", "semi_implicit_euler")) if explicit else None
-    if json_:
-        print_json({"scene": source.name, "world": world, "remarks": remarks, "limits": limits, "warnings": cautions})
-    else:
-        _print(source, remarks, limits, cautions)
-    if cautions:
-        raise typer.Exit(DISTRUSTED)
-
-
-def _print(source: Scene, remarks: tuple[str, ...], limits: Any, cautions: tuple[Caution, ...]) -> None:
-    for remark in remarks:
-        print(f"{remark}.")
+    lines = [f"{remark}." for remark in remarks]
     if limits is not None:
-        print(f"At {source.rate:g} Hz the step holds contact.stiffness <= {limits.stiffness:.3g} N/m and "
-              f"contact.damping <= {limits.damping:.3g} N s/m, each with the other unchanged; critical "
-              f"contacts: {limits.where}, effective mass {limits.mass:.3g} kg.")
-    for caution in cautions:
-        print(f"Warning: {caution}.")
-    if not cautions:
-        print(f"Nothing wrong with {source.name} was found.")
+        lines.append(f"At {source.rate:g} Hz the step holds contact.stiffness <= {limits.stiffness:.3g} N/m and "
+                     f"contact.damping <= {limits.damping:.3g} N s/m, each with the other unchanged; critical "
+                     f"contacts: {limits.where}, effective mass {limits.mass:.3g} kg.")
+    lines += [f"Warning: {caution}." for caution in cautions] or [f"Nothing wrong with {source.name} was found."]
+    return Answer({"scene": source.name, "world": world, "remarks": remarks, "limits": limits, "warnings": cautions},
+                  lines, DISTRUSTED if cautions else 0)

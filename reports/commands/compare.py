@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +13,7 @@ import typer
 from iapb.errors import ArgumentError
 from reference.datasets import problem_files, write_fclib
 from reference.worlds import run_world
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Answer, Json
 from reports.commands.lines import sentence, table_lines
 from reports.commands.progress import stage_progress
 from reports.commands.run import Values, scene_given
@@ -61,7 +60,7 @@ def compare(
     out: Annotated[Path | None, typer.Option(
         help="File of the results, .json; default: in out/compare. The figure stands beside it.")] = None,
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files."""
     if only_problems and not problems:
         raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
@@ -77,8 +76,7 @@ def compare(
         with stage_progress() as progress:
             progress("our own problems", 0, 1)
             count = _export(export)
-        print(f"{count} problems written to {export}")
-        return
+        return Answer({"problems": count, "folder": export}, [f"{count} problems written to {export}"])
     figure, folders = "", {str(folder): folder for folder in problems or ()}
     with stage_progress() as progress:
         if scene is not None:
@@ -91,13 +89,15 @@ def compare(
         else:
             found, place = _compared(complementarity(folders), full, progress), out or FOLDER / "complementarity.json"
             lines = _study_lines(found)
-    _keep(found, place, figure)
-    if json_:
-        print_json(plain_finding(found))
-    else:
-        _print(found, lines, place, figure)
-    if found.failures:
-        raise typer.Exit(1)
+    facts = plain_finding(found)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.write_text(json.dumps(facts, ensure_ascii=False), encoding="utf-8")
+    lines += [sentence(part.sentence, "• ") for part in found.parts]
+    lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in found.failures]
+    if figure:
+        place.with_suffix(".svg").write_text(figure, encoding="utf-8")
+        lines.append(f"Figure: {place.with_suffix('.svg')}")
+    return Answer(facts, [*lines, f"Stored in {place}"], 1 if found.failures else 0)
 
 
 def _require_problems(folder: Path) -> None:
@@ -125,14 +125,6 @@ def _compared(topic: Topic, full: bool, progress: Any) -> Finding:
     return topic(run_world, "full" if full else "quick", lambda done, total: progress(topic.title, done, total))
 
 
-def _keep(found: Finding, place: Path, figure: str) -> None:
-    """Store the results and, in the same folder, the figure."""
-    place.parent.mkdir(parents=True, exist_ok=True)
-    place.write_text(json.dumps(plain_finding(found), ensure_ascii=False), encoding="utf-8")
-    if figure:
-        place.with_suffix(".svg").write_text(figure, encoding="utf-8")
-
-
 def plain_finding(found: Finding) -> dict[str, Any]:
     """Return a finding as plain JSON values: texts, numbers and tables; null for a number that is not finite."""
     parts = [{"name": part.name, "verdict": part.verdict, "sentence": part.sentence} for part in found.parts]
@@ -150,18 +142,6 @@ def _cell(value: Any) -> Any:
 def _figure(found: Finding) -> str:
     drawn = draw(worlds_figure, found.tables)
     return "" if isinstance(drawn, NotComputed) else standalone(drawn)
-
-
-def _print(found: Finding, lines: Sequence[str], place: Path, figure: str) -> None:
-    for line in lines:
-        print(line)
-    for part in found.parts:
-        print(sentence(part.sentence, "• "))
-    for one in found.failures:
-        print(f"Not computed: {one.case}: {one.error}: {one.reason}")
-    if figure:
-        print(f"Figure: {place.with_suffix('.svg')}")
-    print(f"Stored in {place}")
 
 
 def _scene_lines(found: Finding) -> list[str]:

@@ -14,7 +14,7 @@ from iapb.compiling import compiling_told, to_stderr
 from iapb.errors import ArgumentError
 from iapb.simulation import INTERRUPTED, Simulation
 from reference.worlds import find_world
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Json, print_json
 from reports.commands.run import Rendering, SceneName, Values, counted, duration, scene_given
 from reports.live.budget import calibrated
 from reports.live.loop import Loop

@@ -13,9 +13,9 @@ import typer
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
-from reports.commands.as_json import Json, facts_of
+from reports.commands.answer import Json, facts_of, print_lines
 from reports.commands.progress import stage_progress
-from reports.commands.report import print_difference
+from reports.commands.report import difference_lines
 from reports.companions import remembering, write_companions
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports
 from reports.difference_text import unlike
@@ -141,7 +141,7 @@ def check_report(report: Path, out: Path | None, facts: dict[str, Any]) -> None:
     print(f"The report was made with another {', '.join(reasons)}: numbers must agree within {TOLERANCE:.0e}."
           if reasons else "Same code, packages, processor and BLAS kernel: runs must agree to the last bit."
           )  # fmt: skip
-    print_difference(found, TOLERANCE)
+    print_lines(difference_lines(found, TOLERANCE))
     lost = found.count(ONLY_OLD) + len(found.tables_old)
     failed = found.count(DIFFERS) + lost + (0 if reasons else len(found.runs_other))
     facts.update(differs_in=reasons, tolerance=TOLERANCE, differing=found.of(DIFFERS), not_made_again=lost,

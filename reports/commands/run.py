@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +19,7 @@ from iapb.simulation import INTERRUPTED
 from iapb.system import System
 from reference.time_stepping import RigidConstraints, cost_of
 from reference.worlds import find_world
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Answer, Json
 from reports.commands.progress import step_progress
 from reports.runner import Runner
 from reports.store.folder import Place
@@ -55,7 +56,7 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was stopped or killed.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Simulate SCENE and store the run as HDF5. An existing run is reused.
 
     Prints the warnings of iapb check first. Ends with status 3 if the result is not to be trusted.
@@ -79,15 +80,9 @@ def run(
         if entry.run_key != place.key:
             raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
         file = place.path if result.complete else place.partial
-        if json_:
-            print_json(run_as_json(result) | {"warnings": cautions, "file": file})
-        else:
-            _tell(result, place, streamed, resume)
-        distrust = result.distrust
-    if stopped:
-        raise typer.Exit(130 if stopped == INTERRUPTED else 1)
-    if distrust:
-        raise typer.Exit(DISTRUSTED)
+        status = (130 if stopped == INTERRUPTED else 1) if stopped else DISTRUSTED if result.distrust else 0
+        return Answer(run_as_json(result) | {"warnings": cautions, "file": file},
+                      list(_lines(result, place, streamed, resume)), status)
 
 
 def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
@@ -107,18 +102,18 @@ WORTH_SAYING = 60.0  # seconds
 DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
 
 
-def _tell(run: Run, place: Place, streamed: Streamed | None, resume: bool) -> None:
+def _lines(run: Run, place: Place, streamed: Streamed | None, resume: bool) -> Iterator[str]:
     if streamed is not None and streamed.resumed_at:
-        print(f"Resumed after {streamed.resumed_at} steps.")
+        yield f"Resumed after {streamed.resumed_at} steps."
     elif resume and streamed is not None:
-        print("Nothing to resume: computed from the start.")
-    describe(run, existed=streamed is None)
+        yield "Nothing to resume: computed from the start."
+    yield from describe(run, existed=streamed is None)
     if run.complete:
-        print(f"Stored in {place.path}")
+        yield f"Stored in {place.path}"
         return
-    print(f"Stopped: {run.stopped}. The {run.steps} steps done are readable in {place.partial}")
+    yield f"Stopped: {run.stopped}. The {run.steps} steps done are readable in {place.partial}"
     if streamed is not None and streamed.resumable:
-        print("Go on with the same command and --resume.")
+        yield "Go on with the same command and --resume."
 
 
 def run_as_json(run: Run) -> dict[str, Any]:
@@ -140,30 +135,30 @@ def deepest(run: Run) -> float:
 SHOWN_COORDINATES = 12  # more would not fit into a readable line
 
 
-def describe(run: Run, existed: bool) -> None:
-    """Print a summary of a run in sentences; the arrays may be in memory or in the run's file."""
+def describe(run: Run, existed: bool) -> Iterator[str]:
+    """Yield a summary of a run in sentences; the arrays may be in memory or in the run's file."""
     seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
     how = "read from its file; it had taken" if existed else "computed in"
     ignored = ignored_fields(run.effects)
     said = f"; ignores {', '.join(ignored)}" if ignored else ""
-    print(f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}{said}.")
-    print(f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
+    yield f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}{said}."
+    yield (f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
           f"({duration(seconds / steps)} a step).")
     impacts = run.impacts
     if len(impacts.step):
         lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
         most = max(int(block.max()) for block in blocks(impacts.rows))
-        print(f"{counted(len(impacts.step), 'collision')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
+        yield (f"{counted(len(impacts.step), 'collision')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
               f"{counted(most, 'contact')} at once; {lost:.4g} J were lost in them.")
     else:
-        print("No collision was resolved by an impulse.")
+        yield "No collision was resolved by an impulse."
     if len(run.contacts.gap):
-        print(f"Deepest penetration {deepest(run) * 1e3:.4g} mm.")
-    print(f"At the end: {_end_of(run)}.")
+        yield f"Deepest penetration {deepest(run) * 1e3:.4g} mm."
+    yield f"At the end: {_end_of(run)}."
     for remark in run.remarks:
-        print(f"{remark}.")
+        yield f"{remark}."
     if run.distrust:
-        print(f"This result is not to be trusted, because {'; '.join(run.distrust)}.")
+        yield f"This result is not to be trusted, because {'; '.join(run.distrust)}."
 
 
 def _end_of(run: Run) -> str:

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from iapb.scene import find_scene, load_scene, scene_names
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Answer, Json
 
 
-def scenes(json_: Json = False) -> None:
+def scenes(json_: Json = False) -> Answer:
     """List the scenes that come with the project: their names, and what they show."""
     titles = {name: load_scene(find_scene(name)).title for name in scene_names()}
-    if json_:
-        print_json(titles)
-        return
-    for name, title in titles.items():
-        print(f"{name:<24}{title}")
+    return Answer(titles, [f"{name:<24}{title}" for name, title in titles.items()])

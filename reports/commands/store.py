@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from iapb.errors import ArgumentError, IapbError
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Answer, Json
 from reports.commands.progress import stage_progress
 from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
@@ -50,7 +50,7 @@ def store(
     where: Annotated[Path, typer.Argument(help="A folder of results, or one run file (check, again).")] = Path("out"),
     delete: Annotated[bool, typer.Option("--delete", help="gc: remove what it lists.")] = False,
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Check, repair and clean up the run and table files below a folder.
 
     repair and gc act in marked stores only, and only on files of iapb.
@@ -64,35 +64,28 @@ def store(
     if delete and action is not Action.gc:
         raise typer.BadParameter("only with the action gc", param_hint="--delete")
     if action is Action.gc:
-        _gc(where, delete, json_)
-    else:
-        {Action.check: _check, Action.repair: _repair, Action.again: _again}[action](where, json_)
+        return _gc(where, delete)
+    return {Action.check: _check, Action.repair: _repair, Action.again: _again}[action](where)
 
 
-def _check(where: Path, json_: bool) -> None:
+def _check(where: Path) -> Answer:
     with stage_progress() as progress:
         states = check_store(where, partial(progress, "files read whole"))
-    _tell(states, json_)
-    if where.is_file() and states[0].state == FOREIGN:
-        raise typer.Exit(1)
-    if any(state.state == DAMAGED for state in states):
-        if not json_:
-            print(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
-        raise typer.Exit(1)
+    damaged = any(state.state == DAMAGED for state in states)
+    lines = _states(states)
+    if damaged:
+        lines.append(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
+    foreign = where.is_file() and states[0].state == FOREIGN
+    return Answer(_facts(states), lines, 1 if damaged or foreign else 0)
 
 
-def _repair(where: Path, json_: bool) -> None:
+def _repair(where: Path) -> Answer:
     with stage_progress() as progress:
         states = repair_store(where, partial(progress, "files read whole"))
     recovered = [line for log in logs_of_killed(where) for line in _recovered(log)]
     aside = sum(not state.path.exists() for state in states)
-    if json_:
-        _tell(states, json_, logs=recovered, aside=aside)
-        return
-    _tell(states)
-    for line in recovered:
-        print(line)
-    print(f"{aside} damaged set aside, to be computed again when next asked for.")
+    last = f"{aside} damaged set aside, to be computed again when next asked for."
+    return Answer(_facts(states) | {"logs": recovered, "aside": aside}, [*_states(states), *recovered, last])
 
 
 def _recovered(log: Path) -> Iterator[str]:
@@ -110,33 +103,29 @@ def _recovered(log: Path) -> Iterator[str]:
         yield f"{log}: left as it is: {str(error).removeprefix(f'{log}: ')}"
 
 
-def _tell(states: Sequence[FileState], json_: bool = False, **more: Any) -> None:
-    if json_:
-        print_json({"files": states, "count": Counter(state.state for state in states)} | more)
-        return
-    for state in states:
-        if state.state != WHOLE:
-            print(f"{state.path}: {state.state}: {state.why}")
+def _facts(states: Sequence[FileState]) -> dict[str, Any]:
+    return {"files": states, "count": Counter(state.state for state in states)}
+
+
+def _states(states: Sequence[FileState]) -> list[str]:
     count = Counter(state.state for state in states)
     parts = ", ".join(f"{number} {state}" for state, number in count.most_common())
-    print(f"{len(states)} files: {parts or 'none'}")
+    return [*(f"{state.path}: {state.state}: {state.why}" for state in states if state.state != WHOLE),
+            f"{len(states)} files: {parts or 'none'}"]
 
 
-def _gc(where: Path, delete: bool, json_: bool) -> None:
+def _gc(where: Path, delete: bool) -> Answer:
     found = garbage(where)
     size = sum(state.size for state in found) / 1e6
     if delete:
         collect_garbage(found)
-    if json_:
-        print_json({"files": found, "megabytes": size, "removed": delete})
-        return
-    for state in found:
-        print(f"{state.path}: {state.state}: {state.why}")
-    print(f"{len(found)} files, {size:.1f} MB, {'removed' if delete else 'would be removed by --delete'}; results of "
-          "the present code, of your own code and all foreign files are kept.")
+    return Answer({"files": found, "megabytes": size, "removed": delete}, [
+        *(f"{state.path}: {state.state}: {state.why}" for state in found),
+        f"{len(found)} files, {size:.1f} MB, {'removed' if delete else 'would be removed by --delete'}; results of the "
+        "present code, of your own code and all foreign files are kept."])
 
 
-def _again(where: Path, json_: bool) -> None:
+def _again(where: Path) -> Answer:
     files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
     found: dict[Path, Repetition | str] = {}
     with stage_progress() as progress:
@@ -146,26 +135,21 @@ def _again(where: Path, json_: bool) -> None:
                 found[path] = repeat_run(path)
             except IapbError as error:
                 found[path] = f"not simulated again: {str(error).removeprefix(f'{path}: ')}"
-            if not json_:
-                _tell_again(path, found[path])
     same = sum(not isinstance(one, str) and one.same for one in found.values())
-    if json_:
-        print_json({"same": same, "files": {path: {"failed": one} if isinstance(one, str) else
-                                            {"same": one.same, "differs": one.differs} for path, one in found.items()}})
-    else:
-        print(f"{same} of {len(files)} runs came out the same.")
-    if same < len(files):
-        raise typer.Exit(1)
+    facts = {"same": same, "files": {path: {"failed": one} if isinstance(one, str) else
+                                     {"same": one.same, "differs": one.differs} for path, one in found.items()}}
+    lines = [line for path, one in found.items() for line in _repeated(path, one)]
+    return Answer(facts, [*lines, f"{same} of {len(files)} runs came out the same."], 1 if same < len(files) else 0)
 
 
-def _tell_again(path: Path, found: Repetition | str) -> None:
-    """Print what differs in a run that was simulated again, and by how much."""
+def _repeated(path: Path, found: Repetition | str) -> Iterator[str]:
+    """Yield what differs in a run that was simulated again, and by how much."""
     if isinstance(found, str):
-        print(f"{path}: {found}")
+        yield f"{path}: {found}"
         return
-    print(f"{path}: " + ("the same to the last bit" if found.same else "differs in"))
+    yield f"{path}: " + ("the same to the last bit" if found.same else "differs in")
     for one in found.differs:
-        print(f"  {one.name}: {one.how}")
+        yield f"  {one.name}: {one.how}"
     made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
     if not found.same and made != here:
-        print(f"  it was stored under {made}; this is {here}")
+        yield f"  it was stored under {made}; this is {here}"

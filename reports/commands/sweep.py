@@ -10,10 +10,10 @@ from typing import Annotated
 import typer
 
 from reports.batches import cluster, processes
-from reports.commands.as_json import Json, print_json
+from reports.commands.answer import Answer, Json
 from reports.commands.progress import stage_progress
 from reports.sweeps.study import find_study, load_study, scene_of
-from reports.sweeps.sweep import SUMMARY, SweepOutcome, run_sweep
+from reports.sweeps.sweep import SUMMARY, run_sweep
 
 
 def sweep(
@@ -22,7 +22,7 @@ def sweep(
     scheduler: Annotated[str, typer.Option(help="Address of a dask scheduler to use instead.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of the sweeps.")] = Path("out/sweeps"),
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Simulate every point of STUDY that has no run file yet, and write a table of all points.
 
     If it is stopped, the same command continues.
@@ -34,19 +34,13 @@ def sweep(
         outcome = run_sweep(chosen, str(scene_of(chosen, path)), out, who,
                             lambda done, total: progress(f"points of {chosen.name}", done, total))
     made, failed = len(outcome.results) - outcome.reused, outcome.failed
-    if json_:
-        print_json({"study": chosen.name, "points": outcome.results, "computed": made, "found": outcome.reused,
-                    "failed": len(failed), "content_hash": outcome.content_hash,
-                    "table": out / chosen.name / SUMMARY, "runs": out / chosen.name / "runs"})
-    else:
-        _print(chosen.name, outcome, made, out)
-    if failed:
-        raise typer.Exit(1)
-
-
-def _print(name: str, outcome: SweepOutcome, made: int, out: Path) -> None:
-    print(f"{name}: {len(outcome.results)} points, {made} computed now, {outcome.reused} found.")
-    for note, count in Counter(result.note for result in outcome.failed).most_common(5):
-        print(f"  {count} without a run: {note}")
-    print(f"All results together: {outcome.content_hash[:16]}")
-    print(f"Table in {out / name / SUMMARY}, runs in {out / name / 'runs'}")
+    table, runs = out / chosen.name / SUMMARY, out / chosen.name / "runs"
+    facts = {"study": chosen.name, "points": outcome.results, "computed": made, "found": outcome.reused,
+             "failed": len(failed), "content_hash": outcome.content_hash, "table": table, "runs": runs}  # fmt: skip
+    notes = Counter(result.note for result in failed).most_common(5)
+    return Answer(facts, [
+        f"{chosen.name}: {len(outcome.results)} points, {made} computed now, {outcome.reused} found.",
+        *(f"  {count} without a run: {note}" for note, count in notes),
+        f"All results together: {outcome.content_hash[:16]}",
+        f"Table in {table}, runs in {runs}",
+    ], 1 if failed else 0)  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +12,7 @@ from iapb.compiling import compiling_told, to_stderr
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
 from reports.by_name import function_named
 from reports.campaign import KEPT_PER_LAW, Campaign
-from reports.commands.as_json import Json, facts_of, print_json
+from reports.commands.answer import Answer, Json, facts_of
 from reports.commands.progress import stage_progress
 from reports.counterexamples import ENGINE, CampaignRequest, recheck, recheck_command
 from verification import check_passivity
@@ -21,6 +21,7 @@ from verification.laws import CONTRACTS
 from verification.laws.bounds import LawCount
 from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
+from verification.table import Table, titled
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M) in tests of the engine, of any other resolver
 LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json
@@ -52,42 +53,37 @@ def verify(
     scene: Annotated[list[str] | None, typer.Option(
         help="With --simulator: only this fixed scene; may be repeated.")] = None,
     json_: Json = False,
-) -> None:
+) -> Answer | None:
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
     if scene and not simulator:
         raise typer.BadParameter("give an engine with --simulator", param_hint="--scene")
     if (contract != "equality" or laws) and (full or simulator or recheck is not None):
         raise typer.BadParameter("not with --full, --simulator or --recheck", param_hint="--contract, --laws")
     if simulator:
-        verify_simulators(simulator, scene or (), json_)
-        return
+        return verify_simulators(simulator, scene or ())
     if recheck is not None or full:
         with facts_of(json_) as facts:
             passed = print_recheck(recheck, allow_code, facts) if recheck is not None else verify_full(
                 resolver, impacts or 1_000_000, trajectories, seed, workers, out, facts)
             facts["passed"] = passed
-    else:
-        named = [name for given in laws or () for name in given.split(",") if name]
-        passed = _kit(resolver, contract, named if laws else None, impacts, seed, unequal, json_)
-    if not passed:
-        raise typer.Exit(1)
+            if not passed:
+                raise typer.Exit(1)
+        return None
+    named = [name for given in laws or () for name in given.split(",") if name]
+    return _kit(resolver, contract, named if laws else None, impacts, seed, unequal)
 
 
-def _kit(resolver: str, contract: str, laws: list[str] | None, impacts: int | None, seed: int, unequal: bool,
-         json_: bool) -> bool:
+def _kit(resolver: str, contract: str, laws: list[str] | None, impacts: int | None, seed: int,
+         unequal: bool) -> Answer:  # fmt: skip
     tested = function_named("--resolver", resolver)
     with stage_progress() as progress:
         report = check_passivity(tested, contract=contract, laws=laws, impacts=impacts or KIT_IMPACTS, seed=seed,
                                  unequal_restitution=unequal,
                                  progress=lambda done, total: progress("impacts", done, total))
-    if json_:
-        print_json({
-            "resolver": report.resolver, "contract": report.contract, "impacts": report.impacts, "seed": report.seed,
-            "passed": report.passed, "unfinished": report.unfinished, "report": str(report),
-            "laws": [{name: getattr(one, name) for name in LAW_FIELDS} for one in report.verdicts]})
-    else:
-        print(report)
-    return report.passed
+    facts = {"resolver": report.resolver, "contract": report.contract, "impacts": report.impacts, "seed": report.seed,
+             "passed": report.passed, "unfinished": report.unfinished, "report": str(report),
+             "laws": [{name: getattr(one, name) for name in LAW_FIELDS} for one in report.verdicts]}  # fmt: skip
+    return Answer(facts, [str(report)], 0 if report.passed else 1)
 
 
 def verify_full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int, out: Path,
@@ -155,8 +151,8 @@ def print_recheck(path: Path, allow_code: bool, facts: dict[str, Any]) -> bool:
     return kept
 
 
-def verify_simulators(simulators: Sequence[str], scenes: Sequence[str], json_: bool = False) -> None:
-    """Run the scenes in the simulators and print the results; `all` stands for every engine.
+def verify_simulators(simulators: Sequence[str], scenes: Sequence[str]) -> Answer:
+    """Run the scenes in the simulators and return the results; `all` stands for every engine.
 
     Raises
     ------
@@ -174,38 +170,31 @@ def verify_simulators(simulators: Sequence[str], scenes: Sequence[str], json_: b
     with stage_progress() as progress:
         records = compare_engines(names, chosen,
                                   progress=lambda done, total: progress("pairs of engine and scene", done, total))
-    if json_:
-        print_json({"records": records})
-        return
+    lines: list[str | Table] = []
     for name in names:
         for choice in SETTINGS:
             of_engine = [record for record in records if record.engine == name and record.choice == choice]
-            print(sentence(of_engine))
+            lines.append(sentence(of_engine))
             if of_engine[0].missing:
                 break
     present = [record for record in records if not record.missing]
-    if present:
-        _table(present)
-        _settings(present)
+    return Answer({"records": records}, [*lines, *(_details(present) if present else ())])
 
 
-def _table(records: Sequence[EngineRecord]) -> None:
-    print(f"\n{'engine':<11}{'scene':<24}{'settings':<9}{'law':<8}{'energy':>10}{'rise':>10}{'momentum':>10}"
-          f"{'velocity':>10}{'depth [m]':>10}{'drift [m]':>10}")  # fmt: skip
-    for record in records:
-        numbers = (record.energy_error, record.energy_gain, record.momentum_error, record.velocity_error,
-                   record.penetration, record.drift)  # fmt: skip
-        print(f"{record.engine:<11}{record.scene:<24}{record.choice:<9}{verdict(record):<8}"
-              + "".join(f"{'-' if number is None else format(number, '.1e'):>10}" for number in numbers))  # fmt: skip
-        if record.failure:
-            print(f"{'':<11}{record.failure}")
+_NUMBERS = {"energy": "energy_error", "rise": "energy_gain", "momentum": "momentum_error", "velocity": "velocity_error",
+            "depth [m]": "penetration", "drift [m]": "drift"}  # fmt: skip
 
 
-def _settings(records: Sequence[EngineRecord]) -> None:
-    print("\nSettings:")
+def _details(records: Sequence[EngineRecord]) -> Iterator[str | Table]:
+    """Yield the numbers of every engine and scene, the failures, and the settings."""
+    rows = [(one.engine, one.scene, one.choice, verdict(one), *(getattr(one, name) for name in _NUMBERS.values()))
+            for one in records]  # fmt: skip
+    yield ""
+    yield titled(("engine", "scene", "settings", "law", *_NUMBERS), rows, digits=2)
+    yield from (f"{one.engine}, {one.scene}: {one.failure}" for one in records if one.failure)
+    yield "\nSettings:"
     for settings in dict.fromkeys(f"{record.engine}: {record.settings}" for record in records):
         used = [record for record in records if f"{record.engine}: {record.settings}" == settings]
-        print(f"  {settings}")
-        print(f"    in {', '.join(dict.fromkeys(f'{record.scene} ({record.choice})' for record in used))}")
-    for note in dict.fromkeys(f"{record.title}: {record.note}" for record in records if record.note):
-        print(f"  {note}.")
+        yield f"  {settings}"
+        yield f"    in {', '.join(dict.fromkeys(f'{record.scene} ({record.choice})' for record in used))}"
+    yield from dict.fromkeys(f"  {record.title}: {record.note}." for record in records if record.note)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from reports import cli
-from reports.commands.as_json import print_json
+from reports.commands.answer import print_json
 from verification.cost.impacts import Choice
 from verification.finding import REPRODUCED, Column, Finding, Part, Table
 from verification.proofs import all_proofs
