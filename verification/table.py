@@ -19,7 +19,7 @@ _LISTED = 8  # if there are more values, only the smallest and largest are print
 class Column:
     """One quantity of every row.
 
-    key : name of the column in code; heading : printed name, by default the key; unit : empty if there is none
+    key : name of the column, in code and in print; unit : empty if there is none
     condition : True if the study chooses the value, False if it measures it
     part : True if the rows with the same value form one part, which is judged separately
     cases : True if the value counts the cases of a row, such as the impacts of a batch whose worst one is judged
@@ -29,7 +29,6 @@ class Column:
 
     key: str
     unit: str = ""
-    heading: str = ""
     condition: bool = False
     part: bool = False
     cases: bool = False
@@ -38,9 +37,8 @@ class Column:
 
     @property
     def title(self) -> str:
-        """The heading with the unit."""
-        words = self.heading or self.key
-        return f"{words} [{self.unit}]" if self.unit else words
+        """The key with the unit."""
+        return f"{self.key} [{self.unit}]" if self.unit else self.key
 
 
 @dataclass(frozen=True)
@@ -149,7 +147,7 @@ def titled(
     titles: Sequence[str], rows: Iterable[Sequence[Any]] = (), digits: int = 4, note: str = "",
     timed: Collection[str] = (), timed_rows: bool = False, prose: Collection[str] = (),
 ) -> Table:
-    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is key and heading.
+    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is the key.
 
     `timed` and `prose` list the titles of the timed columns and of the columns of sentences.
     """

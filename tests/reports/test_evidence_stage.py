@@ -183,7 +183,7 @@ def test_every_cell_comes_back_with_its_type(tmp_path, cells):
 
 
 def test_a_finding_comes_back_equal_in_every_field(tmp_path):
-    flags = (Column("n", "N s", "number", condition=True, part=True), Column("time", "s", timed=True),
+    flags = (Column("n", "N s", condition=True, part=True), Column("time", "s", timed=True),
              Column("said", prose=True))  # fmt: skip
     judged = Table(flags, ((1, 0.5, "a"), (2, None, "b"), (3, math.inf, "c")), (True, None, False), 3, "a note", True)
     parts = (Part("s", VERDICTS[0], name="p", held=1, decided=2, fails="x", timed=True),)
