@@ -32,7 +32,7 @@ SWING = 0.1  # the same for the motion of a linkage: its error swings to and fro
 STEADY = {"fixed", "prismatic", "planar", "free_flyer"}  # joints of trees whose motion has no such error
 DEEP = 0.5  # of the thinner shape: largest overlap of rigid bodies
 NARROW = 0.1  # of the body: a rigid body cannot pass a gap that is narrower by so much
-OVERRUN = 0.1  # of a joint's range: largest distance beyond a limit at the end
+OVERRUN = {"paper": 0.1, "implicit": 0.04}  # of a joint's range: largest distance beyond a limit at the end, by forces
 FAST = 0.5  # of the thinner shape: a pair that moves by less in a step overlaps before one is through the other
 NEAR = 1e-3  # of an overlap: how far from its wall's surface its end may lie
 SLOW = 1e-6  # [m/s, rad/s] of a free body: slower motion may be rounding error
@@ -302,13 +302,13 @@ def _flew(seen: _Seen) -> Iterator[str]:
 
 
 def _overran(seen: _Seen) -> Iterator[str]:
-    """Say which joint goes beyond a limit by more than half of its range, or by more than a tenth at the end."""
-    run = seen.run
+    """Say which joint goes beyond a limit by more than half of its range, or by more than OVERRUN at the end."""
+    run, most = seen.run, OVERRUN[seen.scene.contact.forces]
     limited = [(i, body.joint_limits) for i, body in zip(seen.mechanism.arrays.q_start, seen.bodies, strict=True)]
     for i, (low, high) in ((i, limits) for i, limits in limited if limits):
         beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)
-        k = len(beyond) - 1 if beyond[-1] > OVERRUN else int(beyond.argmax())
-        if beyond[k] > (OVERRUN if k == len(beyond) - 1 else DEEP):
+        k = len(beyond) - 1 if beyond[-1] > most else int(beyond.argmax())
+        if beyond[k] > (most if k == len(beyond) - 1 else DEEP):
             yield (f"{run.coordinate_names[i]} is {run.q[k, i]:.3g} at {run.time[k]:.4g} s, beyond its limits {low:g} "
                    f"and {high:g} by {beyond[k]:.3g} times their range")
             return

@@ -66,7 +66,7 @@ def test_a_joint_beyond_its_limit_is_seen() -> None:
     door = body("door", SQUARE, [0, 0], []) | {"joint": "prismatic", "axis": [1, 0], "position": [0.0],
                                                "velocity": [0.0], "joint_limits": [-0.1, 0.1], "inertia": 1.0}
     run = run_of(door, steps=20)
-    for beyond, when, seen in ((0.021, -1, True), (0.019, -1, False), (0.101, 5, True), (0.099, 5, False)):
+    for beyond, when, seen in ((0.009, -1, True), (0.007, -1, False), (0.101, 5, True), (0.099, 5, False)):
         q = run.q.copy()
         q[when, 0] = 0.1 + beyond
         assert run.distrust == () and any("beyond its limits -0.1 and 0.1" in why for why in distrust_of(

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-import typer
 
 from reports.commands import bench as command
 from reports.figures.cost import (
@@ -221,18 +220,15 @@ def test_steps_are_shown_with_the_shares_that_exceed_the_noise() -> None:
     assert "wall contacts 40 % (0.8 µs), gravity 10 % (0.2 µs)</text>" in drawn.panels[0].svg
 
 
-def test_bench_ends_with_1_where_a_row_failed(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bench_ends_with_1_where_a_row_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     failed = Failure("impact of 4 contacts", "SolverError", "no solution")
     topic = Finding("haptic-rate", "The haptic rate", "", "", NOT_COMPUTED, failures=(failed,))
     monkeypatch.setattr(command, "haptic_study", lambda *_: topic)
     monkeypatch.setattr(command, "work_precision", lambda **_: Table(METHOD_COLUMNS))
-    with pytest.raises(typer.Exit) as ended:
-        command.bench(False, False, "", 20, 6)
-    assert ended.value.exit_code == 1 and "Not computed: impact of 4 contacts: SolverError" in capsys.readouterr().out
+    answer = command.bench(False, False, "", 20, 6)
+    assert answer.status == 1 and "Not computed: impact of 4 contacts: SolverError: no solution" in answer.lines
     monkeypatch.setattr(command, "haptic_study", lambda *_: replace(topic, failures=()))
-    command.bench(False, False, "", 20, 6)
+    assert command.bench(False, False, "", 20, 6).status == 0
 
 
 def _table(**errors: tuple[float, ...]) -> Table:
