@@ -208,13 +208,13 @@ def draw_wide_case(rng: np.random.Generator, number: int, largest_condition: flo
     m, j, s = np.ldexp(1.0, rng.integers(-SCALE_POWERS, SCALE_POWERS + 1, size=3))
     name += f", times M {m:.0e} J {j:.0e} v {s:.0e}"
     return replace(case, mass_matrix=m * case.mass_matrix, contact_jacobian=j * case.contact_jacobian,
-                   velocity=s * v, family=name)  # fmt: skip
+                   velocity=s * v, family=name)
 
 
 def draw_case(
     rng: np.random.Generator, largest_condition: float = 1e8, coordinates: int | None = None,
     contacts: int | None = None, row_kinds: tuple[str, ...] = ROW_KINDS,
-) -> ImpactCase:  # fmt: skip
+) -> ImpactCase:
     """Return one random impact with κ(M) up to `largest_condition`; by default d ≤ 10 and c ≤ 2 d + 1."""
     rows_kind = _one_of(rng, row_kinds)
     d = int(rng.integers(1, 11)) if coordinates is None else coordinates
@@ -490,18 +490,17 @@ def timed_problems(contacts: int, coordinates: int, seed: int = 0) -> tuple[Impa
 def _timed_problem(d: int, c: int, condition: float, closeness: float, e: float, seed: int) -> ImpactCase:
     rng = np.random.default_rng([seed, d, c, int(np.log10(condition)), int(-np.log10(closeness))])
     mass = with_spectrum(rng, condition ** -np.linspace(0.0, 1.0, d))
-    rows = _near_rows(rng, d, c, closeness)
-    lower = np.linalg.cholesky(mass)
-    whitened = np.linalg.solve(lower, rows.T).T
-    length = np.linalg.norm(whitened, axis=1)
+    case = ImpactCase(mass, _near_rows(rng, d, c, closeness), np.zeros(d), e, "timed", mass_condition=condition,
+                      closeness=closeness)
+    whitened, length = case.rows, np.linalg.norm(case.rows, axis=1)
     approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.where(length > 0.0, length, 1.0))
     sliding = rng.normal(size=d)
     _, values, right = np.linalg.svd(whitened, full_matrices=False)
     for direction in right[values > 1e-12 * values[0]]:
         sliding -= (direction @ sliding) * direction
     sliding /= max(float(np.linalg.norm(sliding)), 1.0)
-    v = np.linalg.solve(lower.T, approach / float(np.linalg.norm(approach)) + sliding)
-    return ImpactCase(mass, rows, v, e, "timed", mass_condition=condition, closeness=closeness)
+    v = np.linalg.solve(case.lower.T, approach / float(np.linalg.norm(approach)) + sliding)
+    return replace(case, velocity=v)
 
 
 def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Floats:

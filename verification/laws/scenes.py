@@ -103,19 +103,29 @@ def _free_body(rng: np.random.Generator, k: int, cell: tuple[float, float]) -> V
     }  # fmt: skip
 
 
-def _linkage(rng: np.random.Generator) -> list[Values]:
-    """Return a chain of one to three links, pinned in the middle of the room."""
-    links = []
+def _linkage(rng: np.random.Generator, in_space: bool = False) -> list[Values]:
+    """Return a chain of one to three links in the middle of the room; in space the joint axes have any direction, and
+    the first joint is sometimes a ball joint.
+    """
+    links: list[Values] = []
     for k in range(int(rng.integers(1, 4))):
-        length, mass = 0.09, round(10.0 ** rng.uniform(-1.0, 0.3), 4)
+        length, mass, zero = 0.09, round(10.0 ** rng.uniform(-1.0, 0.3), 4), [0.0] * (1 + in_space)
+        across = mass * (length**2 + 0.02**2) / 12.0
         link: Values = {
-            "name": f"link_{k}", "joint": "revolute", "mass": mass, "center_of_mass": [length / 2, 0.0],
-            "inertia": round(mass * length**2 / 12, 9), "position": [round(rng.uniform(-1.5, 1.5), 3)],
-            "velocity": [round(rng.normal(scale=3.0), 3)],
-            "shapes": [{"kind": "box", "size": [length, 0.02], "center": [length / 2, 0.0]}],
-        }  # fmt: skip
-        links.append(link | ({"parent": f"link_{k - 1}", "origin": [length, 0.0]} if k else {}))
+            "name": f"link_{k}", "mass": mass, "center_of_mass": [length / 2, *zero],
+            "inertia": [mass * 0.02**2 / 6.0, across, across] if in_space else round(mass * length**2 / 12, 9),
+            "shapes": [{"kind": "box", "size": [length, *(0.02 for _ in zero)], "center": [length / 2, *zero]}],
+        } | _joint(rng, in_space, ball=in_space and k == 0 and rng.random() < 0.3)
+        links.append(link | ({"parent": f"link_{k - 1}", "origin": [length, *zero]} if k else {}))
     return links
+
+
+def _joint(rng: np.random.Generator, in_space: bool, ball: bool) -> Values:
+    if ball:
+        return {"joint": "spherical", "velocity": [round(float(x), 3) for x in rng.normal(scale=3.0, size=3)]}
+    axis = {"axis": [round(float(x), 3) for x in rng.normal(size=3)]} if in_space else {}
+    return {"joint": "revolute", **axis, "position": [round(rng.uniform(-1.5, 1.5), 3)],
+            "velocity": [round(rng.normal(scale=3.0), 3)]}
 
 
 def _walls(rng: np.random.Generator) -> list[Values]:
@@ -190,7 +200,7 @@ def _spatial_bodies(rng: np.random.Generator) -> list[Values]:
     bodies = [_flying(rng, k, SPATIAL_CELLS[cell]) for k, cell in enumerate(cells)]
     if rng.random() < STACK:
         bodies += _stack(rng)
-    return bodies + (_spatial_linkage(rng) if rng.random() < MIDDLE_CHAIN else [])
+    return bodies + (_linkage(rng, in_space=True) if rng.random() < MIDDLE_CHAIN else [])
 
 
 def _flying(rng: np.random.Generator, k: int, cell: tuple[float, float, float]) -> Values:
@@ -221,28 +231,6 @@ def _stack(rng: np.random.Generator) -> list[Values]:
     low, high = -ROOM + 0.5 * height - 1e-6, -ROOM + height + half - 2e-6
     return [below | {"position": [0.0, 0.0, low, 0.0, 0.0, 0.0, 1.0]},
             above | {"position": [0.003, -0.002, high, 0.0, 0.0, 0.0, 1.0]}]  # fmt: skip
-
-
-def _spatial_linkage(rng: np.random.Generator) -> list[Values]:
-    """Return one to three links with joint axes of any direction; the first sometimes has a ball joint."""
-    links: list[Values] = []
-    for k in range(int(rng.integers(1, 4))):
-        length, mass = 0.09, round(10.0 ** rng.uniform(-1.0, 0.3), 4)
-        across = mass * (length**2 + 0.02**2) / 12.0
-        link: Values = {
-            "name": f"link_{k}", "mass": mass, "center_of_mass": [length / 2, 0.0, 0.0],
-            "inertia": [mass * 0.02**2 / 6.0, across, across],
-            "shapes": [{"kind": "box", "size": [length, 0.02, 0.02], "center": [length / 2, 0.0, 0.0]}],
-        } | _joint(rng, ball=k == 0 and rng.random() < 0.3)  # fmt: skip
-        links.append(link | ({"parent": f"link_{k - 1}", "origin": [length, 0.0, 0.0]} if k else {}))
-    return links
-
-
-def _joint(rng: np.random.Generator, ball: bool) -> Values:
-    if ball:
-        return {"joint": "spherical", "velocity": [round(float(x), 3) for x in rng.normal(scale=3.0, size=3)]}
-    return {"joint": "revolute", "axis": [round(float(x), 3) for x in rng.normal(size=3)],
-            "position": [round(rng.uniform(-1.5, 1.5), 3)], "velocity": [round(rng.normal(scale=3.0), 3)]}  # fmt: skip
 
 
 def _add_spatial_hand(rng: np.random.Generator, values: Values) -> None:

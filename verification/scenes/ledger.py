@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -39,8 +38,8 @@ RESTS, SETTLES, MOVES, STOPPED = "stays at rest", "comes to rest", "keeps moving
 DEEP = 0.5  # penetration, as a share of the thinnest moving shape, from which contacts push to the wrong side
 WORTH_NAMING = 1.0  # [%] of the energy exchanged; scenes with a larger energy residual are listed
 _ADDED = "most energy added by an impact, share of the energy exchanged"
-_OWN, _OPEN = "the scene's step", "residual at the scene's step"
-_STEP_FOR = f"step for a residual of {WORTH_NAMING:g} %"
+_OPEN = "residual at the scene's step"
+_STEP_FOR = f"step for a residual of {WORTH_NAMING:g} % [ms]"
 
 
 def _run(study: Study, name: str) -> Run:
@@ -103,19 +102,12 @@ def _of_contacts(table: Table) -> Iterator[Part]:
         f"{most['most rows in one impact']} rows at once ({most['scene']}), the largest energy gain, summed in "
         f"doubles, is {gained:.0e} of the energy exchanged" + (", the rounding of that sum." if rounding else "."),
         REPRODUCED if rounding else REFUTED)
-    ends = Counter(table.column("how it ends"))
-    words = "; ".join(f"{count} {_plural(end, count)}" for end, count in sorted(ends.items()))
-    complete = sum(not end.startswith(STOPPED) for end in ends.elements())
-    yield Part(f"{complete} of {len(rows)} runs complete: {words}.", REPRODUCED if complete == len(rows) else REFUTED)
+    complete = sum(not row["how it ends"].startswith(STOPPED) for row in rows)
+    yield Part(f"{complete} of {len(rows)} runs complete.", REPRODUCED if complete == len(rows) else REFUTED)
 
 
 def _most(rows: Sequence[Row], key: str) -> Row:
     return max(rows, key=lambda row: float(row[key]))
-
-
-def _plural(ending: str, count: int) -> str:
-    first, _, rest = ending.partition(" ")
-    return f"{first.removesuffix('s')} {rest}" if count != 1 else ending
 
 
 def book_row(run: Run) -> dict[str, Any]:
@@ -152,8 +144,8 @@ def open_row(books: OpenBooks, refinements: Iterable[int]) -> dict[str, Any]:
     return {
         "scene": books.scene, **{f"{_OPEN} [%]" if k == 1 else f"at 1/{k} of this step [%]":
                                  100 * shares[k] if k in shares else None for k in refinements},
-        "order declared": books.declared_order, "order measured": books.order, f"{_OWN} [ms]": 1e3 * books.step,
-        f"{_STEP_FOR} [ms]": None if step is None else 1e3 * step,
+        "order declared": books.declared_order, "order measured": books.order,
+        "the scene's step [ms]": 1e3 * books.step, _STEP_FOR: None if step is None else 1e3 * step,
     }
 
 
@@ -175,23 +167,12 @@ def _of_residuals(table: Table) -> Iterator[Part]:
         yield Part(f"No residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged at the scene's own time step.",
                    REPRODUCED)
         return
-    said = "; ".join(f"{row['scene']} {row[_OPEN]:.1f} % ({_gone(row, table)})" for row in wide)
+    said = ", ".join(f"{row['scene']} {row[_OPEN]:.1f} %" for row in wide)
     yield Part(
         f"At the scene's own time step the residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged in "
         f"{len(wide)} of {len(rows)} scenes (absolute values of motion and springs added): {said}.", MIXED,
         miss=f"time stepping leaves up to {wide[0][_OPEN]:.1f} % of a scene's energy unaccounted for "
              f"({wide[0]['scene']})")
-
-
-def _gone(row: Row, table: Table) -> str:
-    """Return in words at which step the residual falls below WORTH_NAMING."""
-    step = row[_STEP_FOR]
-    if step is None or row["order measured"] is None:
-        return "the residual does not fall with the step"
-    shares = [row[column.key] for column in table.columns if column.unit == "%" and row[column.key] is not None]
-    tried = min(shares) <= WORTH_NAMING
-    return (f"order {row['order measured']:.2f}, {'below' if tried else 'extrapolated to'} {WORTH_NAMING:.0f} % at "
-            f"{step:.2g} ms instead of {row[_OWN]:.3g} ms")
 
 
 def over_time(run: Run) -> Iterator[Row]:
