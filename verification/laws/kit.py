@@ -288,10 +288,11 @@ def check_passivity(
     _refuse_signature(resolver, contract)
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
-    tried = _Tried(chosen, {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()}, bounds)
+    trial = _Trial(resolver, bounds, terms, int(impacts), seed, condition, chosen,
+                   {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()})
     with one_thread():
-        done = _try_all(tried, resolver, _Draw(int(impacts), seed, condition, terms), ends, progress)
-        verdicts = tuple(tried.verdicts.values())
+        done = _try_all(trial, ends, progress)
+        verdicts = tuple(trial.verdicts.values())
         broken = next((verdict for verdict in verdicts if not verdict.passed), None)
         example = None if broken is None else _counterexample(
             chosen[broken.law], broken, resolver, bounds, search, seed, ends, contract)
@@ -347,38 +348,35 @@ def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: 
     return {name: law for name, law in known.items() if name in names}
 
 
-class _Draw(NamedTuple):
+class _Trial(NamedTuple):
+    """A resolver, the impacts that it gets, the laws that are tried, and their verdicts so far."""
+
+    resolver: Resolver
+    bounds: Bounds
+    contract: Contract
     impacts: int
     seed: int
     largest_condition: float
-    contract: Contract
-
-
-class _Tried(NamedTuple):
-    """The laws that are tried, and their verdicts so far."""
-
     laws: dict[str, Law]
     verdicts: dict[str, LawVerdict]
-    bounds: Bounds
 
 
-def _try_all(tried: _Tried, resolver: Resolver, draw: _Draw, ends: float,
-             progress: Callable[[int, int], None] | None) -> int:
+def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | None) -> int:
     """Check every impact against its laws; return the number of random impacts tried within the time limit."""
-    watched = Watched(resolver)
-    for done, case, mixed in _drawn(draw, any(name in UNEQUAL_LAWS for name in tried.laws)):
-        for name in _laws_for(case, done, tuple(tried.laws)):
+    watched = Watched(trial.resolver)
+    for done, case, mixed in _drawn(trial):
+        for name in _laws_for(case, done, tuple(trial.laws)):
             if time.monotonic() > ends:
                 return max(0, done - 1)
             own = mixed if name in UNEQUAL_LAWS else case
-            tried.verdicts[name].try_on(tried.laws[name], own, watched, tried.bounds)
+            trial.verdicts[name].try_on(trial.laws[name], own, watched, trial.bounds)
         for suspect, v_plus in watched.suspects:
             if suspect is not case and suspect is not mixed:  # judged by their own laws
-                _judge_energy(tried, suspect, v_plus, resolver, draw.largest_condition)
+                _judge_energy(trial, suspect, v_plus)
         watched.suspects.clear()
         if progress is not None and done > 0:
-            progress(done, draw.impacts)
-    return draw.impacts
+            progress(done, trial.impacts)
+    return trial.impacts
 
 
 def _laws_for(case: ImpactCase, number: int, laws: tuple[str, ...]) -> Iterator[str]:
@@ -389,25 +387,27 @@ def _laws_for(case: ImpactCase, number: int, laws: tuple[str, ...]) -> Iterator[
             yield name
 
 
-def _judge_energy(tried: _Tried, case: ImpactCase, v_plus: Any, resolver: Resolver, largest_condition: float) -> None:
+def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:
     """Check the energy of an answer that another law got for a variant of an impact, without another call."""
     own = replace(case, family=f"{case.family}, a variant of it that another law tried")
-    own._answers[id(resolver)] = resolver, (v_plus, 0)
+    own._answers[id(trial.resolver)] = trial.resolver, (v_plus, 0)
     name = "kinetic_energy" if case.unequal is None else "unequal_kinetic_energy"
-    bounds = tried.bounds if case.condition <= largest_condition else replace(tried.bounds, ceiling=np.inf)
-    if name in tried.laws:
-        tried.verdicts[name].try_on(tried.laws[name], own, resolver, bounds)
+    within = case.condition <= trial.largest_condition
+    if name in trial.laws:
+        trial.verdicts[name].try_on(trial.laws[name], own, trial.resolver,
+                                    trial.bounds if within else replace(trial.bounds, ceiling=np.inf))
 
 
-def _drawn(draw: _Draw, unequal: bool) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
+def _drawn(trial: _Trial) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
     """Yield (number, impact, variant with unequal restitutions): the contract's fixed impacts have number 0, the random
-    ones count from 1. Without `unequal` the variant is the impact itself.
+    ones count from 1. Without a law of unequal restitution the variant is the impact itself.
     """
-    rng, other, adverse = (np.random.default_rng(seed) for seed in (draw.seed, [draw.seed, 1], [draw.seed, 2]))
-    for case in draw.contract.first(adverse):
+    unequal, seed = any(name in UNEQUAL_LAWS for name in trial.laws), trial.seed
+    rng, other, adverse = (np.random.default_rng(own) for own in (seed, [seed, 1], [seed, 2]))
+    for case in trial.contract.first(adverse):
         yield 0, case, with_unequal_restitution(adverse, case) if unequal else case
-    for number in range(draw.impacts):
-        case = draw.contract.draw(rng, number, draw.largest_condition)
+    for number in range(trial.impacts):
+        case = trial.contract.draw(rng, number, trial.largest_condition)
         yield number + 1, case, with_unequal_restitution(other, case) if unequal else case
 
 

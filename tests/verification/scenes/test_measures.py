@@ -11,7 +11,6 @@ from verification.scenes.measures import (
     comparison_window,
     corner_gaps,
     largest_distance,
-    largest_separation,
     momentum_distance,
     peak_force,
     resting_force,
@@ -77,11 +76,6 @@ def test_resting_force_is_the_mean_after_settling():
     moving = column(np.where(np.arange(STEPS + 1) <= 50, 0.1, 0.0), 0)
     assert resting_force(trace(force=force, velocity=moving)) == pytest.approx([0.0, -0.4, 0.0])
     assert resting_force(trace(velocity=column(np.full(STEPS + 1, 0.1), 0))) is None
-
-
-def test_separation_is_that_of_tool_and_device():
-    tool = column(np.linspace(0.0, 5e-3, STEPS + 1), 0)
-    assert largest_separation(trace(tool=tool)) == pytest.approx([5e-3, 0.0, 0.0])
 
 
 def test_a_flat_peg_that_hops_once_lifts_both_corners():
