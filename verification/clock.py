@@ -16,7 +16,8 @@ from typing import TypeVar
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.finding import Column, Failure, attempt
+from verification.finding import Failure, attempt
+from verification.table import Column
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")

@@ -11,20 +11,18 @@ from verification.finding import (
     NOT_COMPUTED,
     REFUTED,
     REPRODUCED,
-    Column,
     Failure,
     Finding,
     Part,
-    Table,
     counted,
     finding_of,
     of_each,
-    table_of,
     verdict_of_trials,
 )
 from verification.hard_cases.case import CaseAbsent, HardCaseVerdict, TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.judge import Simulate, judge_hard_cases
+from verification.table import Column, Table, table_of
 
 STABLE = "stable"
 COLUMNS = (

@@ -9,7 +9,8 @@ from verification.check import Study
 from verification.claims import check_claims, peg
 from verification.claims.conditions import Condition, drawn, start_conditions
 from verification.claims.peg import trace
-from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED, WHERE, Region
+from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED, WHERE
+from verification.region import Region
 
 FEW = tuple(Condition(tilt, friction=0.1) for tilt in (0.0, *(0.1 + 0.01 * n for n in range(10))))
 SWAPPED = {"IAPB": "PB", "PB": "IAPB"}

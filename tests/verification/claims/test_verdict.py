@@ -5,7 +5,6 @@ import pytest
 
 from verification.check import Check
 from verification.finding import (
-    LEAST_CONFIRMING,
     LEAST_DECIDED,
     MIXED,
     NOT_COMPUTED,
@@ -13,14 +12,13 @@ from verification.finding import (
     REFUTED,
     REPRODUCED,
     WHERE,
-    Column,
     Part,
     judge_part,
-    search_region,
-    table_of,
     verdict_of,
     verdict_of_trials,
 )
+from verification.region import LEAST_CONFIRMING, search_region
+from verification.table import Column, table_of
 
 GRID = (Column("tilt", "rad", condition=True), Column("width", "m", condition=True))
 
