@@ -117,8 +117,8 @@ def refusal(block: Block, certificates: Sequence[Sequence[str]], comparisons: It
              for i, entry in enumerate(block.entries) if entry.key in ("lemma", "show")]  # fmt: skip
     for (entry, rule), lines in zip(steps, certificates, strict=True):
         claim, name = text.relation(entry.formula), entry.words or entry.formula
-        if rule and rule[0] in _RULES:
-            if not any(_RULES[rule[0]](text, claim, one, other) for one in known for other in (*known, None)):
+        if rule and rule[0] in ("cancelling", "dividing", "dominating"):
+            if not any(_follows(rule[0], text, claim, one, other) for one in known for other in (*known, None)):
                 return f"'{name}': SymPy finds no facts from which it follows by {rule[0]}"
         elif claim.relation not in ("=", "≥", "⪰"):
             return f"'{name}': a certificate shows no such relation"
@@ -204,25 +204,18 @@ def _not_negative(text: Text, factors: list[Any], known: Sequence[Relation]) -> 
     return text.is_number(_words(sympy.Mul(*matrices))[0][1]) and all(one_of(each, "entries") for each in ends)
 
 
-def _cancelling(text: Text, claim: Relation, square: Relation, core: Relation | None) -> bool:
-    if claim.relation != "=" or square.relation not in ("=", "≥", "⪰") or (core and core.relation != "≻"):
-        return False
-    form = text.transposed(claim.value) * (core.value if core else 1) * claim.value
-    return text.same(form, square.value if square.relation == "=" else -square.value)
-
-
-def _dividing(text: Text, claim: Relation, product: Relation, divisor: Relation | None) -> bool:
-    return (claim.relation == product.relation == "=" and divisor is not None and divisor.relation == "≠"
-            and text.same(divisor.value * claim.value, product.value))  # fmt: skip
-
-
-def _dominating(text: Text, claim: Relation, product: Relation, factor: Relation | None) -> bool:
-    return (factor is not None and claim.relation == product.relation == factor.relation == "≥"
-            and bool(claim.value.is_commutative and factor.value.is_commutative)
-            and text.same(factor.value * claim.value - claim.value**2, product.value))  # fmt: skip
+def _follows(rule: str, text: Text, claim: Relation, source: Relation, other: Relation | None) -> bool:
+    """Whether the claim follows by the rule from `source` (a square or product) and the sign of `other`."""
+    x, value, kind = claim.value, source.value, other and other.relation
+    core = other.value if other else sympy.Integer(1)
+    if rule == "cancelling" and claim.relation == "=" and source.relation in ("=", "≥", "⪰") and kind in (None, "≻"):
+        return text.same(text.transposed(x) * core * x, value if source.relation == "=" else -value)
+    if rule == "dividing" and claim.relation == source.relation == "=" and kind == "≠":
+        return text.same(core * x, value)
+    return (rule == "dominating" and claim.relation == source.relation == kind == "≥"
+            and bool(x.is_commutative and core.is_commutative) and text.same(core * x - x**2, value))  # fmt: skip
 
 
 _OPERATIONS: Mapping[type[ast.operator], Any] = {
     ast.Add: _plus, ast.Sub: lambda one, other: _plus(one, -other), ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Pow: operator.pow}  # fmt: skip
-_RULES: Mapping[str, Any] = {"cancelling": _cancelling, "dividing": _dividing, "dominating": _dominating}

@@ -57,8 +57,8 @@ def checked(block: Block) -> ProofRecord:
 def _checked(task: Task, known: Known) -> StepRecord:
     claim, because = fact_line(task.claim), task.entry.note
     try:
-        step = (infer(task.claim, task.method, known, because) if task.method else
-                prove(task.claim, known, task.terms, task.cofactors, because))  # fmt: skip
+        step = (infer(task.claim, task.method, known) if task.method else
+                prove(task.claim, known, task.terms, task.cofactors))  # fmt: skip
     except Refused as error:
         return StepRecord(claim, because, (), False, str(error))
     lines = step_lines(step, partial(reasons, known=known))

@@ -43,7 +43,6 @@ class Step:
     for `cancel`, `divide` and `dominate` the two facts that it follows from."""
 
     claim: Fact
-    because: str = ""
     terms: tuple[Factors, ...] = ()
     cofactors: tuple[Cofactor, ...] = ()
     sources: tuple[Fact, ...] = ()
@@ -77,8 +76,7 @@ class Known:
         return sorted(filter(_is_rule, both), key=lambda rule: -max(len(word) for _, word in rule.lhs.terms))
 
 
-def prove(claim: Fact, known: Known, terms: Sequence[Factors] = (), cofactors: Sequence[Cofactor] = (),
-          because: str = "") -> Step:  # fmt: skip
+def prove(claim: Fact, known: Known, terms: Sequence[Factors] = (), cofactors: Sequence[Cofactor] = ()) -> Step:
     """Return the step whose certificate has these terms and cofactors; rewriting by the other equations finds the rest.
 
     Raises
@@ -88,19 +86,20 @@ def prove(claim: Fact, known: Known, terms: Sequence[Factors] = (), cofactors: S
     """
     cofactors = [(left, known.equation(fact), right) for left, fact, right in cofactors]
     found = reduced(_rest(claim, terms, cofactors), known.rules(fact for _, fact, _ in cofactors))[1]
-    step = Step(claim, because, tuple(terms), (*cofactors, *found))
+    step = Step(claim, tuple(terms), (*cofactors, *found))
     check(step, known)
     return step
 
 
-def infer(claim: Fact, method: str, known: Known, because: str = "") -> Step:
-    """Return the step by `cancel`, `divide` or `dominate`; Refused if no two known facts fit."""
-    step = next((Step(claim, because, sources=pair) for pair in _pairs(method, known)
-                 if _follows(method, claim, *pair)), None)  # fmt: skip
-    if step is None:
-        raise Refused(f"'{claim.name}': no square or product matches")
-    known.used.update(fact.name for fact in step.sources)
-    return step
+def infer(claim: Fact, method: str, known: Known) -> Step:
+    """Return the step by `cancel`, `divide` or `dominate`; Refused if no known facts fit."""
+    for source in known.facts:
+        for other in (None, *known.facts):
+            if _follows(method, claim, source, other):
+                sources = (source,) if other is None else (source, other)
+                known.used.update(fact.name for fact in sources)
+                return Step(claim, sources=sources)
+    raise Refused(f"'{claim.name}': no square or product matches")
 
 
 def check(step: Step, known: Known) -> None:
@@ -157,28 +156,17 @@ def _words(value: Expression) -> str:
     return " + ".join(" ".join((*scalars, *(each.name for each in word))) for scalars, word in value.terms)
 
 
-def _pairs(method: str, known: Known) -> Iterable[tuple[Fact, ...]]:
-    relation = {"cancel": "≻", "divide": "≠", "dominate": "≥"}[method]
-    for source in known.facts:
-        if method == "cancel":
-            yield (source,)
-        yield from ((source, other) for other in known.facts if other.relation == relation)
-
-
-def _follows(method: str, claim: Fact, source: Fact, other: Fact | None = None) -> bool:
+def _follows(method: str, claim: Fact, source: Fact, other: Fact | None) -> bool:
     """Whether the claim follows from `source` (a square or product) and the sign of `other`."""
-    x, value = claim.difference, source.difference
-    if method == "dominate":
-        return (other is not None and claim.relation == source.relation == "≥" and x.rows == other.lhs.rows == ANY
-                and (other.difference * x - x * x - value).vanishes())  # fmt: skip
-    if claim.relation != "=" or source.relation not in ("=≥⪰" if method == "cancel" else "="):
-        return False
-    if method == "divide":
-        return other is not None and _same(other.difference * x, value)
-    if other is not None and other.lhs.rows != x.rows:
-        return False
+    x, value, kind = claim.difference, source.difference, "" if other is None else other.relation
     core = ONE if other is None else other.difference
-    return _same(x.T * core * x, value if source.relation == "=" else -value)
+    if method == "cancel" and claim.relation == "=" and source.relation in "=≥⪰":
+        return (other is None or (kind == "≻" and core.rows == x.rows)) and _same(
+            x.T * core * x, value if source.relation == "=" else -value)
+    if method == "divide" and claim.relation == source.relation == "=":
+        return kind == "≠" and _same(core * x, value)
+    return (method == "dominate" and claim.relation == source.relation == kind == "≥" and x.rows == core.rows == ANY
+            and _same(core * x - x * x, value))  # fmt: skip
 
 
 def _same(one: Expression, other: Expression) -> bool:
