@@ -35,8 +35,8 @@ def checked(block: Block) -> ProofRecord:
     needed = tuple(_needed(entry, facts, statement) for entry, facts in statement.hypotheses)
     twins = (*(_twin(entry, statement) for entry in block.all("twin")), *starmap(_false, false_comparisons))
     second = by_sympy.refusal(block, [[line.text for line in step.certificate] for step in steps], comparisons)
-    steps += [StepRecord(number_line(*each), "", (), each.is_true, "" if each.is_true else
-                         f"'{each.says}' is false") for each in comparisons]  # fmt: skip
+    steps += [StepRecord(number_line(*each), refusal="" if each.is_true else f"'{each.says}' is false")
+              for each in comparisons]  # fmt: skip
     problems = (
         *(f"step refused: {step.refusal}" for step in steps if not step.accepted),
         *(f"not shown: {refutation.title}" for refutation in (*needed, *twins) if not refutation.refuted),
@@ -49,7 +49,7 @@ def checked(block: Block) -> ProofRecord:
         hypotheses=tuple(map(fact_line, statement.given)), definitions=tuple(map(fact_line, statement.definitions)),
         steps=tuple(steps), conclusions=tuple(map(fact_line, statement.conclusions)), needed=needed, twins=twins,
         remarks=block.prose("remark"), assumed=block.prose("assumed"), measured=block.prose("measured"),
-        verdict="not proved" if problems else "proved", problems=problems, seconds=time.perf_counter() - started,
+        problems=problems, seconds=time.perf_counter() - started,
         sympy=NO if second else YES,
     )  # fmt: skip
 
@@ -60,10 +60,10 @@ def _checked(task: Task, known: Known) -> StepRecord:
         step = (infer(task.claim, task.method, known) if task.method else
                 prove(task.claim, known, task.terms, task.cofactors))  # fmt: skip
     except Refused as error:
-        return StepRecord(claim, because, (), False, str(error))
+        return StepRecord(claim, because, refusal=str(error))
     lines = step_lines(step, partial(reasons, known=known))
     known.facts.append(step.claim)
-    return StepRecord(claim, because, lines, True)
+    return StepRecord(claim, because, lines)
 
 
 def _needed(entry: Entry, dropped: list[Fact], statement: Statement) -> Refutation:

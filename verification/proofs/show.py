@@ -30,13 +30,16 @@ class Line:
 
 @dataclass(frozen=True)
 class StepRecord:
-    """A checked step: claim, reason, certificate term by term, and whether the check accepted it."""
+    """A checked step: claim, reason, certificate term by term, and why the check refused it, if it did."""
 
     claim: Line
-    because: str
-    certificate: tuple[Line, ...]
-    accepted: bool
+    because: str = ""
+    certificate: tuple[Line, ...] = ()
     refusal: str = ""
+
+    @property
+    def accepted(self) -> bool:
+        return not self.refusal
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,6 @@ class ProofRecord:
     remarks: tuple[str, ...]
     assumed: tuple[str, ...]
     measured: tuple[str, ...]
-    verdict: str
     problems: tuple[str, ...]
     seconds: float = field(compare=False)
     sympy: str = NOT_APPLICABLE  # whether SymPy and Coq accept the proof too: YES, NO, or why there is no answer
@@ -75,7 +77,11 @@ class ProofRecord:
 
     @property
     def holds(self) -> bool:
-        return self.verdict == "proved"
+        return not self.problems
+
+    @property
+    def verdict(self) -> str:
+        return "proved" if self.holds else "not proved"
 
     def as_text(self) -> str:
         """Return the whole proof as plain text, readable without the code."""
