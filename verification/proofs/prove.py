@@ -22,7 +22,7 @@ from verification.proofs.show import (
 )
 from verification.proofs.statement import Statement, Task
 from verification.proofs.steps import Known, Refused, infer, prove, reasons
-from verification.proofs.words import Fact, names_in
+from verification.proofs.words import Fact
 
 
 def checked(block: Block) -> ProofRecord:
@@ -91,15 +91,8 @@ def _false(title: str, claim: Comparison, note: str = "") -> Refutation:
 
 
 def _loose_ends(statement: Statement, known: Known, twins: tuple[Refutation, ...]) -> list[str]:
-    """Return problems that weaken the theorem, such as unused or contradictory hypotheses and circular definitions."""
+    """Return problems that weaken the theorem, such as unused or contradictory hypotheses."""
     open_ends = [f"hypothesis never used: {fact.name}" for fact in statement.given if fact.name not in known.used]
-    taken: set[str] = set()
-    for definition in statement.definitions:  # each must name one letter that its right side and earlier ones lack
-        new = names_in(definition.lhs)
-        taken |= names_in(definition.rhs)
-        if len(definition.lhs.terms) != 1 or len(new) != 1 or new & taken:
-            open_ends.append(f"not a definition: {definition.name}")
-        taken |= new
     if not twins:
         open_ends.append("no wrong twin")
     if statement.given and not all_hold([*statement.given, *statement.conclusions], statement.case("")):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from iapb.errors import ArgumentError
 from verification.proofs.cases import Case, completed, read_case
 from verification.proofs.layout import Block, Entry
 from verification.proofs.steps import Cofactor, Factors, Refused
-from verification.proofs.words import Expression, Fact, Reader, letter, product
+from verification.proofs.words import Expression, Fact, Reader, letter, names_in, product
 
 _INFERENCES = {"cancelling": "cancel", "dividing": "divide", "dominating": "dominate"}
 
@@ -39,6 +40,13 @@ class Statement:
         self.hypotheses = [(entry, self._facts(entry)) for entry in block.all("given")]
         self.given = [fact for _, facts in self.hypotheses for fact in facts]
         self.definitions = [fact for entry in block.all("where") for fact in self._facts(entry)]
+        taken: set[str] = set()
+        for definition in self.definitions:
+            new = names_in(definition.lhs)
+            taken |= names_in(definition.rhs)
+            if len(new) != 1 or definition.lhs != names[min(new)] or new & taken:
+                raise ArgumentError("where", definition.name, "one letter that its right side and earlier ones lack")
+            taken |= new
         self.tasks: list[Task] = []
         for entry in block.all("lemma", "show", "sum", "by"):
             self._read_step(entry)

@@ -81,6 +81,14 @@ def test_a_corrupted_statement_is_refused_by_each_kernel(name: str, old: str, ne
     assert checked(block).sympy == "no"
 
 
+@pytest.mark.parametrize("wrong", ["2 v⁺ = v", "v⁺ᵀ = v", "e² = e − 1", "v⁺ = v⁺ − v"])
+def test_only_a_letter_is_defined(wrong: str) -> None:
+    """e² = e − 1, say, would be an assumption that no case has to meet."""
+    text = re.sub(":: v⁺ = .*", f":: {wrong}", layout.text_of("theorem_1"))
+    with pytest.raises(ArgumentError, match="one letter that its right side and earlier ones lack"):
+        checked(layout.read("theorem_1", text))
+
+
 @pytest.mark.parametrize("name", all_proofs())
 def test_a_corrupted_certificate_is_refused_by_each_kernel(name: str) -> None:
     statement, lines = Statement(layout.block(name)), certificates(name)

@@ -1,6 +1,6 @@
 (* Theorems 1 and 2 and equation (33) of the paper, in any ring that is not commutative and has a transposition.
 
-   Matrices of fitting sizes obey the laws of such a ring; no size occurs, so an identity of the ring is one of matrices.
+   Matrices of fitting sizes obey the laws of such a ring; no size occurs, so its identities are identities of matrices.
    The statements are those of verification/proofs/statements, written by hand. N is the inverse of the mass matrix M, J
    the contact Jacobian, v and w are the velocities before and after the impact, e the restitution, which commutes with
    all. The form of M vanishes only for x = 0 (`definite`), and the number `form` is its own transpose (`number`). *)
