@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
+from reference.one_thread import one_thread
+from verification.check import Check, Study
 from verification.finding import (
     NOT_COMPUTED,
     REFUTED,
@@ -16,21 +17,14 @@ from verification.finding import (
     Part,
     counted,
     finding_of,
-    of_each,
     verdict_of_trials,
 )
-from verification.hard_cases.case import CaseAbsent, HardCaseVerdict, TrajectoryCase
+from verification.hard_cases import judge
+from verification.hard_cases.case import CaseAbsent, TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES
-from verification.hard_cases.judge import Simulate, judge_hard_cases
-from verification.table import Column, Table, table_of
+from verification.table import Row, Table
 
 STABLE = "stable"
-COLUMNS = (
-    Column("method"), Column("outcome"), Column("energy gain"), Column("gain allowed"), Column("restitution residual"),
-    Column("forward error"), Column("error allowed"), Column("smallest fault seen"), Column("rank"),
-    Column("exact rank"), Column("time", "µs", timed=True), Column("note"),
-)
-OF_CASE = (Column("case"), Column("kind"))
 ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
 _NOTES = {
     "impact": "Stable: gain at most 10 d ε √κ(M), restitution residual at most 1e-8, error at most the error allowed. "
@@ -48,10 +42,12 @@ _NOTES = {
 
 
 def hard_cases(
-    simulate: Simulate, progress: Callable[[int, int], None], failures: list[Failure]
+    simulate: judge.Simulate, progress: Callable[[int, int], None], failures: list[Failure]
 ) -> tuple[Finding, ...]:
     """Return one finding per case with one part per method; the finding of a case without its files says so."""
-    return tuple(of_each(counted(HARD_CASES, progress), lambda name: [_judged(name, simulate, failures)], failures))
+    study = Study(simulate, failures=failures)
+    with one_thread():
+        return tuple(study.each(counted(HARD_CASES, progress), lambda name: [_judged(study, name)]))
 
 
 def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) -> Finding:
@@ -66,12 +62,12 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
                 + (f" {skipped} were skipped because their files are absent." if skipped else ""))  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
     question = "Is the engine stable on problems on which other methods fail?"
-    rows = [{"case": case.title, "kind": case.details["kind"], **row}
-            for case in tried for row in case.tables[case.key].records()]  # fmt: skip
-    table = table_of((*OF_CASE, *COLUMNS[:-1]), rows, digits=2)  # all columns but the notes
+    rows = [{"case": case.title, "kind": case.details["kind"], **row, "note": ""}
+            for case in tried for row in case.tables[case.key].by_title()]  # fmt: skip
+    table = EVERY_METHOD.table_of(rows)
     others = f" and {len(failing) - 1} more hard cases" if len(failing) > 1 else ""
     parts = (Part(sentence, verdict, miss="".join(failing[:1]) + others, quantities=(stable,)),)
-    tables = {"every method": table}
+    tables = {EVERY_METHOD.key: table.without("note") if rows else table}
     return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures, (stable,))
 
 
@@ -81,16 +77,16 @@ def _outcome(case: Finding) -> str:
     return next((by[name] for name in ENGINE if name in by), "")
 
 
-def _judged(name: str, simulate: Simulate, failures: list[Failure]) -> Finding:
+def _judged(study: Study, name: str) -> Finding:
     try:
-        case = HARD_CASES[name]()
+        case = study.once(name, HARD_CASES[name])
     except CaseAbsent as absent:
         return Finding(name, name.replace("_", " "), "", str(absent), NOT_COMPUTED,
                        details={"source": "published problems"})  # fmt: skip
     kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
-    rows = [_row(found) for found in judge_hard_cases(cases=[name], simulate=simulate, failures=failures)]
-    table = table_of(COLUMNS, rows, digits=2, note=_NOTES[kind])
-    return finding_on(name, case.name, table if any(row["note"] for row in rows) else table.without("note"),
+    pairs = [(name, method) for method in judge.methods_for(case)]
+    table = replace(EVERY_METHOD, note=_NOTES[kind]).table(study, pairs)
+    return finding_on(name, case.name, table if any(table.column("note")) else table.without("note"),
                       {"kind": kind, "source": case.source, "why it is hard": case.why_hard, "truth": case.law,
                        "expected": case.expected})  # fmt: skip
 
@@ -105,16 +101,20 @@ def finding_on(key: str, title: str, table: Table, details: dict[str, str]) -> F
     return replace(found, verdict=verdict_of_trials(stable), details=details)
 
 
-def _row(found: HardCaseVerdict) -> dict[str, Any]:
+def _row(study: Study, pair: tuple[str, str]) -> Row:
     """Return a verdict as a row; a quantity that does not apply or is missing is None, printed as a dash."""
-    return {
-        "method": found.method, "outcome": found.verdict, "energy gain": _known(found.energy_gain),
-        "gain allowed": _known(found.energy_bound), "restitution residual": _known(found.restitution_residual),
-        "forward error": _known(found.forward_error), "error allowed": _known(found.forward_bound),
-        "smallest fault seen": _known(found.smallest_fault), "rank": None if found.note else found.rank,
-        "exact rank": found.exact_rank, "time": _known(found.seconds * 1e6), "note": found.note,
+    name, method = pair
+    found = judge.judge_hard_case(study.results[name], method, study.run)
+    values = {
+        "energy gain": found.energy_gain, "gain allowed": found.energy_bound,
+        "restitution residual": found.restitution_residual, "forward error": found.forward_error,
+        "error allowed": found.forward_bound, "smallest fault seen": found.smallest_fault,
     }  # fmt: skip
+    known = {key: value if math.isfinite(value) else None for key, value in values.items()}
+    return {"method": method, "outcome": found.verdict, **known, "rank": None if found.note else found.rank,
+            "exact rank": found.exact_rank,
+            "time [µs]": 1e6 * found.seconds if math.isfinite(found.seconds) else None, "note": found.note}  # fmt: skip
 
 
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+EVERY_METHOD = Check(key="every method", question="Which methods are stable?", cases=lambda study: (), row=_row,
+                     timed=["time"], digits=2)  # fmt: skip
