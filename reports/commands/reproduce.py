@@ -161,9 +161,11 @@ def _write_figure(key: str, out: Path, depth: str, facts: dict[str, Any]) -> Non
     if not isinstance(drawn, Figure):
         raise ArgumentError("--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}")
     out.mkdir(parents=True, exist_ok=True)
-    pictures = {f"{key}-{number}.svg": (panel.svg, panel.label) for number, panel in enumerate(drawn.panels)}
-    for name, (svg, label) in {**pictures, f"{key}.svg": (standalone(drawn), "all of it")}.items():
-        (out / name).write_text(svg, encoding="utf-8")
+    pictures = {f"{key}-{number}.{'html' if panel.is_table else 'svg'}": (panel.svg, panel.label)
+                for number, panel in enumerate(drawn.panels)}  # fmt: skip
+    whole = f"{key}.{'html' if any(panel.is_table for panel in drawn.panels) else 'svg'}"
+    for name, (text, label) in {**pictures, whole: (standalone(drawn), "all of it")}.items():
+        (out / name).write_text(text, encoding="utf-8")
         print(f"{out / name}: {label or drawn.title}")
     facts["drawings"] = [out / name for name in pictures]
     _end_where_something_failed(failed, facts)

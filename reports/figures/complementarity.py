@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -45,82 +45,84 @@ def agreement_map(numbers: Table, border: Table) -> Drawn:
     kinds: dict[str, Rows] = {}
     for row in rows:
         kinds.setdefault(f"{row['impacts']}, {row['redundant rows']}", []).append(row)
+    size = (4.6, 0.24 * len(kinds) + 0.7)
+    with Plot("agreement-map-share", size) as shares, Plot("agreement-map-distance", size) as distances:
+        for y, members in enumerate(kinds.values()):
+            found = [row["share that agrees"] for row in members]
+            shares.axes.barh(y, 1.0, height=0.62, color=VERMILION, alpha=0.18, linewidth=0)
+            shares.axes.barh(y, sum(found) / len(found), height=0.62, color=BLUE, linewidth=0)
+            shares.axes.plot(found, [y] * len(found), "|", color=INK, markersize=7)
+            apart = [row for row in members if row["median distance where they differ"] is not None]
+            if not apart:
+                distances.axes.plot(0.0, y, "o", markersize=4, markerfacecolor=PAPER, markeredgecolor=MUTED)
+            for row in apart:
+                typical, shift = row["median distance where they differ"], y + 0.22 * (2.0 * row["e"] - 1.0)
+                distances.axes.plot([typical, row["largest distance"]], [shift] * 2, color=VERMILION, linewidth=1.1)
+                distances.axes.plot(typical, shift, "X", color=VERMILION, markeredgecolor=PAPER, markeredgewidth=0.4,
+                                    markersize=_SIZES.get(row["e"], 4.6))  # fmt: skip
+        for plot in (shares, distances):
+            plot.lines_of(list(kinds))
+            plot.axes.grid(False, axis="y")
+        shares.axes.set(xlim=(0.0, 1.005), xlabel="share of impacts with one motion")
+        distances.axes.set(xlim=(-0.03, 2.05), xlabel="distance of v⁺, of |v⁻| (ring: none differ)")
+    with Plot("agreement-map-border", (4.1, 3.4)) as plot:
+        plot.curve([(0.0, 0.0), (1.0, 1.0)], BOUND, marked=False)
+        for cosine, ratio, predicted, agrees in border.select(_BORDER).rows:
+            plot.axes.plot(cosine, ratio, "o" if agrees else "x", color=BLUE if agrees else VERMILION, markersize=6,
+                           markeredgewidth=1.4)  # fmt: skip
+            if predicted != agrees:
+                plot.axes.plot(cosine, ratio, "s", markersize=12, markerfacecolor="none", markeredgecolor=INK)
+        plot.axes.set(xlim=(-1.02, 1.02), ylim=(0.0, 1.06), xlabel="cosine c of the two rows", ylabel="speed ratio r")
     whole = sorted({row["impacts"] for row in rows} - {row["impacts"] for row in rows if row["share that agrees"] < 1})
-    right = sum(predicted == found for predicted, found in border.select(_BORDER[2:]).rows)
+    right = sum(predicted == agrees for predicted, agrees in border.select(_BORDER[2:]).rows)
     panels = (
-        Panel(_shares(kinds), f"Shares of impacts with one motion, by kind; all of them for {', '.join(whole)}.",
+        Panel(shares.svg, f"Shares of impacts with one motion, by kind; all of them for {', '.join(whole)}.",
               "share of impacts that agree"),
-        Panel(_distances(kinds), "Distances of the motions, by kind.", "distance where they differ"),
-        Panel(_border(border), f"Agreement of two contacts is as predicted by r >= c at {right} of {len(border.rows)} "
-              "points.", "two contacts"),
+        Panel(distances.svg, "Distances of the motions, by kind.", "distance where they differ"),
+        Panel(plot.svg, f"Agreement of two contacts is as predicted by r >= c at {right} of {len(border.rows)} points.",
+              "two contacts"),
     )  # fmt: skip
     legend = (("agree", OUTCOMES["holds"]), ("differ", OUTCOMES["fails"]), ("r = c", BOUND))
     return Drawn(panels, numbers, legend)
 
 
-def _shares(kinds: Mapping[str, Rows]) -> str:
-    with Plot("agreement-map-share", (4.6, 0.24 * len(kinds) + 0.7)) as plot:
-        axes = plot.axes
-        _kinds(plot, kinds)
-        for y, rows in enumerate(kinds.values()):
-            shares = [row["share that agrees"] for row in rows]
-            axes.barh(y, 1.0, height=0.62, color=VERMILION, alpha=0.18, linewidth=0)
-            axes.barh(y, sum(shares) / len(shares), height=0.62, color=BLUE, linewidth=0)
-            axes.plot(shares, [y] * len(shares), "|", color=INK, markersize=7)
-        axes.set(xlim=(0.0, 1.005), xlabel="share of impacts with one motion")
-    return plot.svg
-
-
-def _distances(kinds: Mapping[str, Rows]) -> str:
-    with Plot("agreement-map-distance", (4.6, 0.24 * len(kinds) + 0.7)) as plot:
-        axes = plot.axes
-        _kinds(plot, kinds)
-        for y, rows in enumerate(kinds.values()):
-            members = [row for row in rows if row["median distance where they differ"] is not None]
-            if not members:
-                axes.plot(0.0, y, "o", markersize=4, markerfacecolor=PAPER, markeredgecolor=MUTED)
-            for row in members:
-                typical, shift = row["median distance where they differ"], y + 0.22 * (2.0 * row["e"] - 1.0)
-                axes.plot([typical, row["largest distance"]], [shift, shift], "-", color=VERMILION, linewidth=1.1)
-                axes.plot(typical, shift, "X", color=VERMILION, markeredgecolor=PAPER, markeredgewidth=0.4,
-                          markersize=_SIZES.get(row["e"], 4.6))  # fmt: skip
-        axes.set(xlim=(-0.03, 2.05), xlabel="distance of v⁺, of |v⁻| (ring: none differ)")
-    return plot.svg
-
-
-def _kinds(plot: Plot, kinds: Mapping[str, Rows]) -> None:
-    plot.lines_of(list(kinds))
-    plot.axes.grid(False, axis="y")
-
-
-def _border(numbers: Table) -> str:
-    with Plot("agreement-map-border", (4.1, 3.4)) as plot:
-        axes = plot.axes
-        plot.curve([(0.0, 0.0), (1.0, 1.0)], BOUND, marked=False)
-        for cosine, ratio, predicted, found in numbers.select(_BORDER).rows:
-            axes.plot(cosine, ratio, "o" if found else "x", color=BLUE if found else VERMILION, markersize=6,
-                      markeredgewidth=1.4)  # fmt: skip
-            if predicted != found:
-                axes.plot(cosine, ratio, "s", markersize=12, markerfacecolor="none", markeredgecolor=INK)
-        axes.set(xlim=(-1.02, 1.02), ylim=(0.0, 1.06), xlabel="cosine c of the two rows", ylabel="speed ratio r")
-    return plot.svg
+_AGREE = 1e-11  # of |v⁻|: motions closer than this are equal
+_COUNTS = (5, 10, 20, 50, 100, 200)  # ticks
 
 
 @recipe("where-to-stop", "Where to stop using (19): dense piles", "complementarity/piles", section="hero", caption="")
 def where_to_stop(numbers: Table) -> Drawn:
     """Draw the distance from complementarity over contacts and redundancy, and the time of impulses that only push."""
-    rows = numbers.records()
+    rows = [row | {"redundant share": row["redundant"] / row["contacts"],
+                   "distance": max(row["median distance from the LCP"], _AGREE),
+                   "price": row["time of pushing"] / row["time of (21)"]} for row in numbers.records()]  # fmt: skip
+    looks = looks_of(f"contacts that are {given}" for given in dict.fromkeys(numbers.column("rows")))
     limit = max(row["most contacts that agree"] for row in rows)
-    price = [row["time of pushing"] / row["time of (21)"] for row in rows]
-    panels = (
-        Panel(_distance_over(rows, "contacts", limit), f"No pile of more than {limit} contacts agrees.",
-              "distance over the number of contacts"),
-        Panel(_distance_over([row | {"redundant share": row["redundant"] / row["contacts"]} for row in rows],
-                             "redundant share"), "Distance over the share of redundant contacts.",
-              "distance over the share that is redundant"),
-        Panel(_price(rows, price), f"Pushing takes {min(price):.2g} to {max(price):.2g} times as long as (21).",
-              "price of impulses that only push"),
-    )  # fmt: skip
+    price = [row["price"] for row in rows]
+    panels = []
+    for x, y, alt, label in (
+        ("contacts", "distance", f"No pile of more than {limit} contacts agrees.",
+         "distance over the number of contacts"),
+        ("redundant share", "distance", "Distance over the share of redundant contacts.",
+         "distance over the share that is redundant"),
+        ("contacts", "price", f"Pushing takes {min(price):.2g} to {max(price):.2g} times as long as (21).",
+         "price of impulses that only push"),
+    ):  # fmt: skip
+        with Plot(f"where-to-stop-{'price' if y == 'price' else x.replace(' ', '-')}") as plot:
+            for name, look in looks.items():
+                plot.marks([(row[x], row[y]) for row in rows if name.endswith(f" {row['rows']}")], look)
+            if y == "distance":
+                plot.log(x, "distance of the motions, of |v⁻|", "y", ylim=(0.3 * _AGREE, 3.0))
+            else:
+                plot.axes.axhline(1.0, **line_arguments(BOUND, marked=False))
+                plot.axes.set(xlabel=x, ylabel="time, pushing over (21)", ylim=(0.0, None))
+            if x == "contacts":
+                plot.axes.set_xscale("log")
+                plot.axes.set_xticks(_COUNTS, [str(count) for count in _COUNTS])
+                plot.axes.minorticks_off()
+            if (x, y) == ("contacts", "distance"):
+                plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
+        panels.append(Panel(plot.svg, alt, label))
     caption = (
         "A pile of spheres falls on the floor. Each mark is one kind of pile, in which either all approaching or all "
         "touching contacts are equalities (19). Marks at the lower edge agree with complementarity to rounding. Do not "
@@ -129,42 +131,7 @@ def where_to_stop(numbers: Table) -> Drawn:
         f"It agrees with complementarity to {max(row['pushing from the LCP'] for row in rows):.0e} and takes "
         f"{min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
     )
-    looks = looks_of(f"contacts that are {given}" for given in dict.fromkeys(numbers.column("rows")))
-    return Drawn(panels, numbers, (*looks.items(), ("stop here", BOUND)), caption)
-
-
-_AGREE = 1e-11  # of |v⁻|: motions closer than this are equal
-
-
-def _distance_over(rows: Rows, name: str, limit: float | None = None) -> str:
-    with Plot(f"where-to-stop-{name.replace(' ', '-')}") as plot:
-        _by_rows(plot, rows, [(row[name], max(row["median distance from the LCP"], _AGREE)) for row in rows])
-        plot.log(name, "distance of the motions, of |v⁻|", "y", ylim=(0.3 * _AGREE, 3.0))
-        if limit is not None:
-            plot.axes.set_xscale("log")
-            counts = (5, 10, 20, 50, 100, 200)
-            plot.axes.set_xticks(counts, [str(count) for count in counts], minor=False)
-            plot.axes.minorticks_off()
-            plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
-    return plot.svg
-
-
-def _price(rows: Rows, price: Sequence[float]) -> str:
-    with Plot("where-to-stop-price") as plot:
-        _by_rows(plot, rows, [(row["contacts"], ratio) for row, ratio in zip(rows, price, strict=True)])
-        plot.axes.axhline(1.0, **line_arguments(BOUND, marked=False))
-        plot.axes.set(xscale="log", xlabel="contacts", ylabel="time, pushing over (21)", ylim=(0.0, None))
-        counts = (5, 10, 20, 50, 100, 200)
-        plot.axes.set_xticks(counts, [str(count) for count in counts])
-        plot.axes.minorticks_off()
-    return plot.svg
-
-
-def _by_rows(plot: Plot, rows: Rows, places: Sequence[tuple[float, float]]) -> None:
-    """Mark each place in the style of the row choice of that case."""
-    looks = looks_of(f"contacts that are {row['rows']}" for row in rows)
-    for name, look in looks.items():
-        plot.marks([place for row, place in zip(rows, places, strict=True) if name.endswith(f" {row['rows']}")], look)
+    return Drawn(tuple(panels), numbers, (*looks.items(), ("stop here", BOUND)), caption)
 
 
 # At most six curves; the table has all solvers. In the table, "IAPB" is the engine called from Python.
@@ -209,7 +176,12 @@ def _family(rows: Rows, styles: Mapping[str, LineStyle], family: str, most: int)
                 plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
                                        color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
             plot.axes.plot(at, [row["median"] for row in timed], **line_arguments(style))
-            _unsolved(plot.axes, [row for row in rows if row["solver"] == name], style, top)
+            for row in (row for row in rows if row["solver"] == name):
+                if row["median"] is None:  # not run
+                    plot.axes.plot(row["contacts"], top, "^", color=style.color, markersize=6, zorder=5)
+                elif row["outcome"] == "failed":
+                    plot.axes.plot(row["contacts"], row["median"], "x", color=style.color, markersize=10,
+                                   markeredgewidth=1.8, zorder=5)  # fmt: skip
         plot.log("contacts", "time of one impact [µs]")
         contacts = sorted({row["contacts"] for row in rows})
         plot.axes.set_xticks(contacts, [str(count) for count in contacts])
@@ -217,16 +189,6 @@ def _family(rows: Rows, styles: Mapping[str, LineStyle], family: str, most: int)
     words = ", ".join(f"{row['solver']} {row['median']:.3g}" for row in rows
                       if row["contacts"] == most and row["median"] is not None)  # fmt: skip
     return Panel(plot.svg, f"Median times of a {family} of {most} contacts in microseconds: {words}.", family)
-
-
-def _unsolved(axes: Any, rows: Rows, style: LineStyle, top: float) -> None:
-    """Draw crosses over wrong answers, and triangles where a solver was not run."""
-    for row in rows:
-        at, median = row["contacts"], row["median"]
-        if row["outcome"] == "failed" and median is not None:
-            axes.plot(at, median, "x", color=style.color, markersize=10, markeredgewidth=1.8, zorder=5)
-        elif median is None:
-            axes.plot(at, top, "^", color=style.color, markersize=6, zorder=5)
 
 
 def _steps(numbers: Table) -> str:
@@ -268,7 +230,13 @@ def performance_profile(numbers: Table) -> Drawn:
             words = ", ".join(f"{solver} {share:.0%}" for solver, share in last.items())
             panels.append(Panel(_profile(here, looks, f"{collection}-{kind}"), f"Shares solved at all: {words}.",
                                 f"{collection}, {kind}"))  # fmt: skip
-    return Drawn(tuple(panels), _ends(numbers), tuple(legend.items()))
+    curves: dict[tuple[str, ...], list[float]] = {}
+    for *name, share in numbers.select(("collection", "kind", "solver", "share solved")).rows:
+        curves.setdefault(tuple(name), []).append(share)
+    ends = ("share as the fastest", "share solved at all")
+    rows = tuple((*name, shares[0], shares[-1]) for name, shares in curves.items())
+    return Drawn(tuple(panels), titled(("collection", "kind", "solver", *ends), rows, 3, timed=ends),
+                 tuple(legend.items()))  # fmt: skip
 
 
 def _profile(numbers: Table, looks: Mapping[str, LineStyle], key: str) -> str:
@@ -283,16 +251,6 @@ def _profile(numbers: Table, looks: Mapping[str, LineStyle], key: str) -> str:
         axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0", "0.25", "0.5", "0.75", "1"])
         axes.set_ylim(-0.02, 1.03)
     return plot.svg
-
-
-def _ends(numbers: Table) -> Table:
-    """Return a table of the first and last value of each curve."""
-    curves: dict[tuple[str, ...], list[float]] = {}
-    for *name, share in numbers.select(("collection", "kind", "solver", "share solved")).rows:
-        curves.setdefault(tuple(name), []).append(share)
-    ends = ("share as the fastest", "share solved at all")
-    return titled(("collection", "kind", "solver", *ends),
-                  tuple((*name, shares[0], shares[-1]) for name, shares in curves.items()), 3, timed=ends)  # fmt: skip
 
 
 _ROUNDING = 1e-12  # smaller errors count as none

@@ -18,11 +18,9 @@ from reports.figures.style import OUTCOMES
 _SIZE = (4.1, 2.4)  # inches
 _DOT = 6.8  # diameter of a full dot [points]
 
-Outcomes = Sequence[bool | None]
-
 
 def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[float]], y: tuple[str, Sequence[float]],
-                  holds: Outcomes, panels: Sequence[Any] | None = None, ranked: bool = False) -> Figure:
+                  holds: Sequence[bool | None], panels: Sequence[Any] | None = None, ranked: bool = False) -> Figure:
     """Draw where a claim holds.
 
     Parameters
@@ -32,49 +30,31 @@ def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[flo
     panels : label of each trial's map; trials with the same label share a map. Default: one map.
     ranked : whether x shows ranks, with a tick for each value, so that close values are drawn apart.
     """
-    values = sorted(set(x[1])) if ranked else []
-    across = [values.index(value) for value in x[1]] if ranked else x[1]
-    split = ["" for _ in holds] if panels is None else [str(value) for value in panels]
+    ticks = sorted(set(x[1])) if ranked else []
+    split = [""] * len(holds) if panels is None else [str(value) for value in panels]
     drawn = []
     for number, name in enumerate(dict.fromkeys(split)):
-        kept = [k for k, value in enumerate(split) if value == name]
-        places = _places([across[k] for k in kept], [y[1][k] for k in kept], [holds[k] for k in kept])
-        drawn.append(Panel(_map(f"{key}-{number}", x[0], y[0], places, values), _words(x[0], y[0], places), name))
+        places: dict[tuple[float, float], list[bool | None]] = {}
+        for across, up, held, panel in zip(x[1], y[1], holds, split, strict=True):
+            if panel == name:
+                places.setdefault((float(ticks.index(across) if ranked else across), float(up)), []).append(held)
+        with Plot(f"{key}-{number}", _SIZE) as plot:
+            for place, trials in places.items():
+                decided = [held for held in trials if held is not None]
+                share = float(np.mean(decided)) if decided else 0.0
+                if not decided:
+                    plot.marks([place], OUTCOMES["cannot tell"], markersize=5, zorder=3)
+                elif share < 1.0:
+                    plot.marks([place], OUTCOMES["fails"], markersize=6, zorder=4)
+                if share > 0.0:
+                    plot.marks([place], OUTCOMES["holds"], markersize=_DOT * share**0.5, zorder=3)
+            plot.axes.margins(0.08)
+            plot.axes.set(xlabel=x[0], ylabel=y[0])
+            if ticks:
+                plot.axes.set_xticks(range(len(ticks)), [f"{tick:g}" for tick in ticks], rotation=90)
+        outcomes = [held for trials in places.values() for held in trials]
+        words = (f"Map over {x[0]} and {y[0]}: the claim holds in {outcomes.count(True)} of {len(outcomes)} trials, "
+                 f"fails in {outcomes.count(False)}.")  # fmt: skip
+        drawn.append(Panel(plot.svg, words, name))
     legend = tuple(OUTCOMES.items())
     return Figure(key, "", title, caption, tuple(drawn), None, legend if None in holds else legend[:2])
-
-
-Places = dict[tuple[float, float], list[bool | None]]
-
-
-def _places(x: Sequence[float], y: Sequence[float], holds: Outcomes) -> Places:
-    """Collect the outcomes of the trials at each place."""
-    places: Places = {}
-    for place_x, place_y, held in zip(x, y, holds, strict=True):
-        places.setdefault((float(place_x), float(place_y)), []).append(held)
-    return places
-
-
-def _map(key: str, x_label: str, y_label: str, places: Places, ticks: Sequence[float]) -> str:
-    with Plot(key, _SIZE) as plot:
-        axes = plot.axes
-        for (x, y), trials in places.items():
-            decided = [held for held in trials if held is not None]
-            share = float(np.mean(decided)) if decided else 0.0
-            if not decided:
-                plot.marks([(x, y)], OUTCOMES["cannot tell"], markersize=5, zorder=3)
-            elif share < 1.0:
-                plot.marks([(x, y)], OUTCOMES["fails"], markersize=6, zorder=4)
-            if share > 0.0:
-                plot.marks([(x, y)], OUTCOMES["holds"], markersize=_DOT * share**0.5, zorder=3)
-        axes.margins(0.08)
-        axes.set(xlabel=x_label, ylabel=y_label)
-        if ticks:
-            axes.set_xticks(range(len(ticks)), [f"{tick:g}" for tick in ticks], rotation=90)
-    return plot.svg
-
-
-def _words(x_label: str, y_label: str, places: Places) -> str:
-    outcomes = [held for trials in places.values() for held in trials]
-    return (f"Map over {x_label} and {y_label}: the claim holds in {outcomes.count(True)} of {len(outcomes)} trials, "
-            f"fails in {outcomes.count(False)}.")

@@ -7,8 +7,7 @@ in the paper's Figure 4. Lengths are in metres and angles in radians, unless a n
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,8 @@ from reports.figures.canvas import Canvas, arrow, draw_bodies, draw_walls, inver
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
 from reports.figures.geometry import body_outlines
 from reports.figures.labels import arrow_of_time, note_beside
-from reports.figures.plot import Plot
-from reports.figures.style import FORCE, MUTED, STYLES, LineStyle, line_arguments
-from reports.figures.svg import PATH, TIME
+from reports.figures.plot import PATH, TIME, Plot
+from reports.figures.style import FORCE, MUTED, PANEL, STYLES, LineStyle, line_arguments
 from verification.finding import Table, titled
 
 Floats = NDArray[np.float64]
@@ -58,62 +56,16 @@ _LOST_AXES = "The axes that the paper printed are lost; ours show all values."
 _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
 
 
-@dataclass(frozen=True)
-class Shown:
-    """One figure: its number in the paper, its runs, and the quantities drawn."""
+def _recipe(number: int, title: str, runs: Mapping[str, str], forces: bool, caption: str) -> Recipe:
+    """Return the recipe of a figure of the paper with trajectories or forces of some runs."""
+    key = f"fig{number:02d}"
 
-    number: int
-    title: str
-    runs: Mapping[str, str]
-    forces: bool
-    caption: str
+    def draw(*given: Run) -> Drawn:
+        named = dict(zip(runs, given, strict=True))
+        panels, numbers = _force_figure(key, named) if forces else _trajectory_figure(key, named, runs)
+        return Drawn(tuple(panels), numbers, legend_of(named))
 
-    @property
-    def recipe(self) -> Recipe:
-        """Return the recipe of the figure."""
-        key = f"fig{self.number:02d}"
-
-        def draw(*runs: Run) -> Drawn:
-            named = dict(zip(self.runs, runs, strict=True))
-            panels, numbers = _force_figure(key, named) if self.forces else _trajectory_figure(key, named, self.runs)
-            return Drawn(panels, numbers, legend_of(named))
-
-        number = f"Figure {self.number}"
-        return recipe(key, self.title, *self.runs.values(), caption=self.caption, number=number)(draw)
-
-
-FIGURES = (
-    Shown(7, "Hand trajectories of the four worlds", UNLIMITED, False,
-          "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. The thick "
-          "line is the ideal world, with rigid contact. Look at which curves leave it at the first contact and which "
-          "return to it. The device can apply any force. Of the paper's axes one range is known, 0 to −2.5; its unit, "
-          "the other axis and the start of the peg are not. Our axes are therefore in mm and degrees. The fifth and "
-          "sixth panel show the distance from ideal at each instant, in position and in angle. The last panel uses the "
-          "printed range, in mm, for the depth of the hand beyond the place where the ideal world stops it."),
-    Shown(8, "Forces that the hand feels", UNLIMITED, True,
-          "At the first contact the worlds with impulses render pulses of one step each, while the penalty force rises "
-          "over many steps. Further panels show the whole run, and the small forces between the pulses, to be compared "
-          f"with the 0.32 N that balance the hand. {_LOST_AXES}"),
-    Shown(9, "Three ways to respect the limits of the device", STRATEGIES, False,
-          "The device can apply at most 15 N and 1 N m. Saturating clips the impulse for the device only, so tool and "
-          "device separate. Scaling reduces the impulse for both. Spreading repeats the scaled impulse in the next "
-          f"steps. The fifth and sixth panel show the distance from ideal. {_LOST_AXES}"),
-    Shown(10, "Hand trajectories with a limited device", LIMITED, False,
-          "As Figure 7, but IAPB spreads each impulse over as many steps as the limits of 15 N and 1 N m require. The "
-          "fifth and sixth panel show the distance from ideal, the last the penetration of the virtual peg, which is "
-          f"zero in the ideal world and in CBuc. {_LOST_AXES}"),
-    Shown(11, "Forces with a limited device", LIMITED, True,
-          "As Figure 8 with spread impulses. At the first contact IAPB now takes several steps of at most 15 N; "
-          f"compare them with the slow rise of the penalty force. {_LOST_AXES}"),
-    Shown(12, "Emulated device at 512 Hz: trajectories", DEVICE, False,
-          "The paper measured these trajectories on hardware. Here the device is emulated at 512 Hz, with the delay, "
-          "quantisation and damping given in the scene. Look at how often each curve bounces and when it comes to "
-          f"rest. {_LOST_AXES}"),
-    Shown(13, "Emulated device at 512 Hz: forces", DEVICE, True,
-          "Forces of the emulated device in the runs of Figure 12. IAPB LM spreads its impulses so that each stays "
-          "within the limits of the device. The fine chatter comes from the resolution of the encoders, amplified by "
-          f"the damping of the position channel. {_LOST_AXES}"),
-)  # fmt: skip
+    return recipe(key, title, *runs.values(), caption=caption, number=f"Figure {number}")(draw)
 
 
 def legend_of(names: Mapping[str, Any]) -> tuple[tuple[str, LineStyle], ...]:
@@ -139,98 +91,77 @@ _PRINTED_RANGE = (-2.5, 0.05)  # ticks of Figure 7 that the paper's text keeps; 
 # Trajectories
 
 
-def _trajectory_figure(key: str, runs: Mapping[str, Run],
-                       names: Mapping[str, str]) -> tuple[tuple[Panel, ...], Table]:
+def _trajectory_figure(key: str, runs: Mapping[str, Run], names: Mapping[str, str]) -> tuple[list[Panel], Table]:
     """Draw the path and the three coordinates; for limited devices, also tool against device and penetration."""
-    panels = [_path_panel(key, runs), *(_coordinate_panel(key, runs, k) for k in range(3))]
+    ends = "; ".join("{} ends at ({:.1f}, {:.1f})".format(curve, *(MILLI * run.device_q[-1, :2]))
+                     for curve, run in runs.items())  # fmt: skip
+    panels = [Panel(_path(f"{key}-path", runs), f"Paths of the hand in the plane, in mm: {ends}.",
+                    "path of the hand, from just before contact")]  # fmt: skip
+    everyone = ", ".join(runs)
+    for k, (name, unit, factor) in enumerate(_COORDINATES):
+        values = {curve: factor * run.device_q[:, k] for curve, run in runs.items()}
+        panels.append(_over_time(f"{key}-{'xyz'[k]}", runs, values, f"{name} [{unit}]", f"{name} over time",
+                                 f"{name} of the hand over time in {unit}, for {everyone}."))
     if "ideal" in runs:
-        panels += [_deviation_panel(key, runs, *each) for each in _DEVIATIONS]
-    if names == UNLIMITED:
-        panels.append(_printed_panel(key, runs))
+        ideal = runs["ideal"].device_q
+        for which, name, axis, factor in _DEVIATIONS:
+            values = {curve: factor * np.linalg.norm(run.device_q[: len(ideal), which]
+                                                     - ideal[: len(run.device_q), which], axis=1)
+                      for curve, run in runs.items() if curve != "ideal"}  # fmt: skip
+            largest = ", ".join(f"{curve} {value.max():.2g}" for curve, value in values.items())
+            panels.append(_over_time(f"{key}-off-{name}", runs, values, axis, f"deviation from ideal, {name}",
+                                     f"{axis} over time; at most: {largest}."))
+    if names == UNLIMITED:  # beyond the final position in the ideal world, on the axis of the printed Figure 7
+        values = {curve: MILLI * (runs["ideal"].device_q[-1, 1] - run.device_q[:, 1]) for curve, run in runs.items()}
+        deepest = ", ".join(f"{curve} {value.min():.2f}" for curve, value in values.items())
+        panels.append(_over_time(f"{key}-printed", runs, values, "past the rigid place [mm]",
+                                 "depth along y past the rigid place, on the printed range",
+                                 f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
+                                 height=_PRINTED_RANGE))  # fmt: skip
     if names in (LIMITED, STRATEGIES):
-        panels += [_separation_panel(key, runs), _penetration_panel(key, runs)]
+        apart = {curve: MILLI * np.hypot(*(tool_positions(run)[:, :2] - run.device_q[:, :2]).T)
+                 for curve, run in runs.items()}  # fmt: skip
+        depths = {curve: MILLI * penetration_over_time(run) for curve, run in runs.items()}
+        panels += [_over_time(f"{key}-apart", runs, apart, "distance [mm]", "how far tool and device come apart",
+                              f"Distance between tool and device over time, for {everyone}."),
+                   _over_time(f"{key}-depth", runs, depths, "penetration [mm]", "how deep the virtual peg sinks in",
+                              f"Penetration of the virtual peg over time, for {everyone}.")]  # fmt: skip
     reference = "ideal" if "ideal" in runs else None
-    apart = ("distance from ideal: x [mm]", "y [mm]", "θ [°]") if reference else ()
-    columns = ("world", *apart, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
+    distances = ("distance from ideal: x [mm]", "y [mm]", "θ [°]") if reference else ()
+    columns = ("world", *distances, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
     note = _FROM_IDEAL + _SETTLED if reference else _SETTLED
-    return tuple(panels), titled(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)
+    return panels, titled(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)
 
 
-def _path_panel(key: str, runs: Mapping[str, Run]) -> Panel:
+def _path(key: str, runs: Mapping[str, Run], size: tuple[float, float] = PANEL, *, equal: bool = False) -> str:
     """Draw y against x of the device, from shortly before the first contact."""
-    first = first_shown(runs)
-    with Plot(f"{key}-path", kind=PATH) as plot:
+    with Plot(key, size, kind="" if equal else PATH) as plot:
         for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[first:, :2].T
+            x, y = MILLI * run.device_q[first_shown(runs) :, :2].T
             plot.axes.plot(x, y, **line_arguments(STYLES[curve]),
-                           markevery=marks(len(x), number), zorder=3 + number / 10)  # fmt: skip
+                           markevery=marks(len(x), number), zorder=3 + number / 10)
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        if equal:
+            plot.axes.set_aspect("equal", adjustable="datalim")
         invert(plot.axes)
         arrow_of_time(plot.axes)
-    ends = {curve: MILLI * run.device_q[-1, :2] for curve, run in runs.items()}
-    words = "; ".join(f"{curve} ends at ({x:.1f}, {y:.1f})" for curve, (x, y) in ends.items()) + "."
-    return Panel(plot.svg, f"Paths of the hand in the plane, in mm: {words}",
-                 "path of the hand, from just before contact")  # fmt: skip
-
-
-def _over_time(key: str, runs: Mapping[str, Run], values_of: Callable[[Run], Floats], label: str, *,
-               height: tuple[float, float] | None = None, first: int = 0, last: int | None = None, **how: Any) -> str:
-    """Draw one quantity of each run over time, from step `first` to step `last`; `height` limits the vertical axis."""
-    with Plot(key, kind=TIME) as plot:
-        for number, (curve, run) in enumerate(runs.items()):
-            values = values_of(run)[first:last]
-            plot.axes.plot(run.time[first : first + len(values)], values, **line_arguments(STYLES[curve]), **how,
-                           markevery=marks(len(values), number), zorder=3 + number / 10)
-        longest = max(runs.values(), key=lambda run: run.steps)
-        plot.axes.set(xlabel="t [s]", ylabel=label, xlim=(longest.time[first], longest.time[: last][-1]))
-        if height is not None:
-            plot.axes.set_ylim(height)
     return plot.svg
 
 
-def _deviation_panel(key: str, runs: Mapping[str, Run], which: slice, name: str, label: str, factor: float) -> Panel:
-    """Draw the distance between the hand and its position in the ideal world at the same time."""
-    ideal = runs["ideal"].device_q
-
-    def apart(run: Run) -> Floats:
-        count = min(len(ideal), len(run.device_q))
-        return factor * np.linalg.norm(run.device_q[:count, which] - ideal[:count, which], axis=1)
-
-    others = {curve: run for curve, run in runs.items() if curve != "ideal"}
-    largest = ", ".join(f"{curve} {apart(run).max():.2g}" for curve, run in others.items())
-    svg = _over_time(f"{key}-off-{name}", others, apart, label)
-    return Panel(svg, f"{label} over time; at most: {largest}.", f"deviation from ideal, {name}")
-
-
-def _coordinate_panel(key: str, runs: Mapping[str, Run], k: int) -> Panel:
-    name, unit, factor = _COORDINATES[k]
-    svg = _over_time(f"{key}-{'xyz'[k]}", runs, lambda run: factor * run.device_q[:, k], f"{name} [{unit}]")
-    return Panel(svg, f"{name} of the hand over time in {unit}, for {', '.join(runs)}.", f"{name} over time")
-
-
-def _printed_panel(key: str, runs: Mapping[str, Run]) -> Panel:
-    """Draw how far the hand moves along y beyond its final position in the ideal world, on the axis of Figure 7."""
-    stop = runs["ideal"].device_q[-1, 1]
-    svg = _over_time(f"{key}-printed", runs, lambda run: MILLI * (stop - run.device_q[:, 1]),
-                     "past the rigid place [mm]", height=_PRINTED_RANGE)  # fmt: skip
-    deepest = ", ".join(f"{curve} {MILLI * (stop - run.device_q[:, 1].max()):.2f}" for curve, run in runs.items())
-    return Panel(svg, f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
-                 "depth along y past the rigid place, on the printed range")  # fmt: skip
-
-
-def _separation_panel(key: str, runs: Mapping[str, Run]) -> Panel:
-    def apart(run: Run) -> Floats:
-        return MILLI * np.hypot(*(tool_positions(run)[:, :2] - run.device_q[:, :2]).T)
-
-    svg = _over_time(f"{key}-apart", runs, apart, "distance [mm]")
-    return Panel(svg, f"Distance between tool and device over time, for {', '.join(runs)}.",
-                 "how far tool and device come apart")
-
-
-def _penetration_panel(key: str, runs: Mapping[str, Run]) -> Panel:
-    svg = _over_time(f"{key}-depth", runs, lambda run: MILLI * penetration_over_time(run), "penetration [mm]")
-    return Panel(svg, f"Penetration of the virtual peg over time, for {', '.join(runs)}.",
-                 "how deep the virtual peg sinks in")
+def _over_time(key: str, runs: Mapping[str, Run], values: Mapping[str, Floats], axis: str, label: str, alt: str, *,
+               height: tuple[float, float] | None = None, first: int = 0, last: int | None = None,
+               **how: Any) -> Panel:  # fmt: skip
+    """Draw a quantity of each run over time, from step `first` to step `last`; `height` limits the vertical axis."""
+    with Plot(key, kind=TIME) as plot:
+        for number, (curve, whole) in enumerate(values.items()):
+            shown, run = whole[first:last], runs[curve]
+            plot.axes.plot(run.time[first : first + len(shown)], shown, **line_arguments(STYLES[curve]), **how,
+                           markevery=marks(len(shown), number), zorder=3 + number / 10)
+        longest = max((runs[curve] for curve in values), key=lambda run: run.steps)
+        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=(longest.time[first], longest.time[: last][-1]))
+        if height is not None:
+            plot.axes.set_ylim(height)
+    return Panel(plot.svg, alt, label)
 
 
 def tool_positions(run: Run) -> Floats:
@@ -275,12 +206,24 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
 # Forces that the device's actuators apply
 
 
-def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...], Table]:
+def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[list[Panel], Table]:
     """Draw force along x and torque at the first contact, over the whole run and between impulses.
 
     The table has the peak forces and the forces held at the end.
     """
-    panels = tuple(panel for each in _FORCES for panel in _force_panels(key, runs, *each))
+    start = first_shown(runs, _AT_CONTACT[0])
+    end = start + round(sum(_AT_CONTACT) / next(iter(runs.values())).dt)
+    panels = []
+    for k, title, label, cut in _FORCES:
+        views: dict[str, dict[str, Any]] = {
+            f"at the first contact: {sum(_AT_CONTACT):g} s": {"first": start, "last": end}, "the whole run": {},
+            f"between impulses: cut at ±{cut:g} {label[label.index('[') + 1 : -1]}": {"height": (-cut, cut)},
+        }  # fmt: skip
+        values = {curve: run.device_force[:, k] for curve, run in runs.items()}
+        for letter, (view, shown) in zip("cam", views.items(), strict=True):
+            panels.append(_over_time(f"{key}-{k}{letter}", runs, values, label, f"{title}, {view}",
+                                     f"{label} over time, {view}, for {', '.join(runs)}.", drawstyle="steps-post",
+                                     **shown))
     columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
                "held τ [N m]")
     rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(), *held_force(run).tolist())
@@ -288,26 +231,43 @@ def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[tuple[Panel, ...],
     return panels, titled(columns, rows, digits=3, note=_HELD)
 
 
-def _force_panels(key: str, runs: Mapping[str, Run], k: int, title: str, label: str, cut: float) -> Iterator[Panel]:
-    dt = next(iter(runs.values())).dt
-    start = first_shown(runs, _AT_CONTACT[0])
-    unit = label[label.index("[") + 1 : -1]
-    views: dict[str, dict[str, Any]] = {
-        f"at the first contact: {sum(_AT_CONTACT):g} s": {"first": start, "last": start + round(sum(_AT_CONTACT) / dt)},
-        "the whole run": {}, f"between impulses: cut at ±{cut:g} {unit}": {"height": (-cut, cut)},
-    }  # fmt: skip
-    for number, (view, shown) in enumerate(views.items()):
-        svg = _over_time(f"{key}-{k}{'cam'[number]}", runs, lambda run: run.device_force[:, k], label,
-                         drawstyle="steps-post", **shown)
-        yield Panel(svg, f"{label} over time, {view}, for {', '.join(runs)}.", f"{title}, {view}")
-
-
 def held_force(run: Run) -> Floats:
     """Return the mean device force over the last part of the run (d_t,)."""
     return np.asarray(run.device_force[-max(int(_LAST_PART * run.steps), 1):].mean(axis=0))
 
 
-RECIPES = tuple(figure.recipe for figure in FIGURES)
+RECIPES = (
+    _recipe(7, "Hand trajectories of the four worlds", UNLIMITED, False,
+        "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. The thick "
+        "line is the ideal world, with rigid contact. Look at which curves leave it at the first contact and which "
+        "return to it. The device can apply any force. Of the paper's axes one range is known, 0 to −2.5; its unit, "
+        "the other axis and the start of the peg are not. Our axes are therefore in mm and degrees. The fifth and "
+        "sixth panel show the distance from ideal at each instant, in position and in angle. The last panel uses the "
+        "printed range, in mm, for the depth of the hand beyond the place where the ideal world stops it."),
+    _recipe(8, "Forces that the hand feels", UNLIMITED, True,
+        "At the first contact the worlds with impulses render pulses of one step each, while the penalty force rises "
+        "over many steps. Further panels show the whole run, and the small forces between the pulses, to be compared "
+        f"with the 0.32 N that balance the hand. {_LOST_AXES}"),
+    _recipe(9, "Three ways to respect the limits of the device", STRATEGIES, False,
+        "The device can apply at most 15 N and 1 N m. Saturating clips the impulse for the device only, so tool and "
+        "device separate. Scaling reduces the impulse for both. Spreading repeats the scaled impulse in the next "
+        f"steps. The fifth and sixth panel show the distance from ideal. {_LOST_AXES}"),
+    _recipe(10, "Hand trajectories with a limited device", LIMITED, False,
+        "As Figure 7, but IAPB spreads each impulse over as many steps as the limits of 15 N and 1 N m require. The "
+        "fifth and sixth panel show the distance from ideal, the last the penetration of the virtual peg, which is "
+        f"zero in the ideal world and in CBuc. {_LOST_AXES}"),
+    _recipe(11, "Forces with a limited device", LIMITED, True,
+        "As Figure 8 with spread impulses. At the first contact IAPB now takes several steps of at most 15 N; "
+        f"compare them with the slow rise of the penalty force. {_LOST_AXES}"),
+    _recipe(12, "Emulated device at 512 Hz: trajectories", DEVICE, False,
+        "The paper measured these trajectories on hardware. Here the device is emulated at 512 Hz, with the delay, "
+        "quantisation and damping given in the scene. Look at how often each curve bounces and when it comes to "
+        f"rest. {_LOST_AXES}"),
+    _recipe(13, "Emulated device at 512 Hz: forces", DEVICE, True,
+        "Forces of the emulated device in the runs of Figure 12. IAPB LM spreads its impulses so that each stays "
+        "within the limits of the device. The fine chatter comes from the resolution of the encoders, amplified by "
+        f"the damping of the position channel. {_LOST_AXES}"),
+)  # fmt: skip
 
 
 # The first picture
@@ -335,7 +295,8 @@ def hero(*given: Run) -> Drawn:
     panels = (
         Panel(_motion(runs["ideal"]), "A tilted peg moves to the lower right and comes to rest in a corner.",
               "the motion in the ideal world, to scale"),
-        Panel(_paths(runs), "Paths of the hand in the four worlds. Distance of the hand from the ideal at the end: "
+        Panel(_path("hero-paths", runs, _SIZE, equal=True),
+              "Paths of the hand in the four worlds. Distance of the hand from the ideal at the end: "
               f"{ends}.", "the path of the hand, magnified, equal scales"),
     )  # fmt: skip
     return Drawn(panels, None, legend_of(UNLIMITED))
@@ -357,19 +318,6 @@ def _motion(run: Run) -> str:
         scale_bar(axes, (high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm", turned=True)
         note_beside(axes, start, start + _FORCE_LENGTH * force, f"hand, {np.hypot(*force):.2f} N", 9, color=FORCE)
     return canvas.svg
-
-
-def _paths(runs: Mapping[str, Run]) -> str:
-    with Plot("hero-paths", _SIZE) as plot:
-        for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[first_shown(runs) :, :2].T
-            plot.axes.plot(x, y, **line_arguments(STYLES[curve]), zorder=4 + number / 10,
-                           markevery=marks(len(x), number))  # fmt: skip
-        plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        plot.axes.set_aspect("equal", adjustable="datalim")
-        invert(plot.axes)
-        arrow_of_time(plot.axes)
-    return plot.svg
 
 
 def ghost_steps(run: Run) -> list[int]:

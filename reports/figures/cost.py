@@ -7,12 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from reports.figures.canvas import note
-from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.figure import Cell, Drawn, Panel, grid, recipe
 from reports.figures.labels import SIZE, label_marks
 from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot
+from reports.figures.standalone import swatch
 from reports.figures.style import (
     BLUE,
     FORCE,
@@ -25,46 +27,18 @@ from reports.figures.style import (
     looks_of,
 )
 from verification.claims.speed import costs_more
+from verification.cost import impacts
+from verification.cost import trajectories as motion
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
-from verification.cost.impacts import (
-    CALLED,
-    COMPILED,
-    IAPB,
-    LEMKE,
-    LONGEST,
-    NO_GAIN,
-    PYTHON,
-    QP,
-    SWEEPS,
-    by_way,
-    choices,
-    lost_to_rivals,
-    short_time,
-)
 from verification.cost.step_cost import IDEAL
-from verification.cost.trajectories import (
-    FIT_FALL,
-    FIT_RUNS,
-    GAINED,
-    IMPULSES,
-    INTEGRATORS,
-    STIFFENED,
-    USEFUL,
-    WORLDS,
-    Curve,
-    by_chance,
-    curves,
-    times,
-    worth,
-)
 from verification.finding import Table
 
 Row = Mapping[str, Any]
 
 _LOOKS: dict[str, LineStyle] = {  # method -> its look, which has its name at the curve
-    IAPB: STYLES["IAPB"], SWEEPS: STYLES["Gauss-Seidel"], LEMKE: STYLES["Lemke"],
-    CALLED: STYLES["IAPB, Python"], PRINTED: STYLES["printed, numpy"], QP: STYLES["DAQP, Python"],
+    impacts.IAPB: STYLES["IAPB"], impacts.SWEEPS: STYLES["Gauss-Seidel"], impacts.LEMKE: STYLES["Lemke"],
+    impacts.CALLED: STYLES["IAPB, Python"], PRINTED: STYLES["printed, numpy"], impacts.QP: STYLES["DAQP, Python"],
 }
 _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloured cell; strengths of colours
 
@@ -84,30 +58,18 @@ _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloure
 )  # fmt: skip
 def which_method(numbers: Table) -> Drawn:
     """Draw a cell per size and budget."""
-    found = choices(numbers)
+    found = impacts.choices(numbers)
     sizes = list(dict.fromkeys(found.select(("contacts", "coordinates")).rows))
     budgets = list(dict.fromkeys(found.column("budget")))
-    with Plot("which-method", (6.8, 0.46 * len(sizes) + 0.7)) as plot:
-        for row in found.records():
-            x, y = budgets.index(row["budget"]), sizes.index((row["contacts"], row["coordinates"]))
-            solved = row["method"] != "none"
-            if solved:
-                plot.axes.fill_between((x - 0.48, x + 0.48), y - 0.46, y + 0.46, linewidth=0,
-                                       color=_LOOKS[row["method"]].color,
-                                       alpha=_STRONG if row["largest error"] <= _EXACT else _WEAK)
-            plot.axes.text(x, y - 0.2, row["method"], ha="center", va="center", fontsize=8.5,
-                           color=INK if solved else MUTED)
-            plot.axes.text(x, y + 0.2, _cell_note(row), ha="center", va="center", fontsize=7.0,
-                           color=INK if solved else MUTED)
-        plot.without_lines()
-        plot.axes.set_xticks(range(len(budgets)), [short_time(1e-6 * budget) for budget in budgets])
-        plot.axes.xaxis.tick_top()
-        plot.axes.set_yticks(range(len(sizes)), [f"{c} contact{'s' * (c > 1)}, d = {d}" for c, d in sizes])
-        plot.axes.set(xlim=(-0.5, len(budgets) - 0.5), ylim=(len(sizes) - 0.5, -0.5))
-        plot.axes.tick_params(length=0)
+    cells = {f"{c} contact{'s' * (c > 1)}, d = {d}": [
+        Cell(row["method"], _cell_note(row), MUTED) if row["method"] == "none" else
+        Cell(row["method"], _cell_note(row), _LOOKS[row["method"]].color,
+             _STRONG if row["largest error"] <= _EXACT else _WEAK)
+        for row in found.where(contacts=c, coordinates=d).records()] for c, d in sizes}  # fmt: skip
     told = "; ".join(f"{row['contacts']} contacts in {row['budget']:g} µs: {row['method']}"
                      for row in found.records())
-    return Drawn((Panel(plot.svg, told, wide=True),), found)
+    table = grid([impacts.short_time(1e-6 * budget) for budget in budgets], cells)
+    return Drawn((Panel(table, told, wide=True),), found)
 
 
 def _cell_note(row: Row) -> str:
@@ -183,8 +145,8 @@ def _contacts(row: Row) -> str:
 def _lost_on_hard_impacts(numbers: Table) -> str:
     """Say on how many hard impacts another solver is faster than IAPB: both compiled, then both from Python."""
     said = ""
-    for called, how in ((COMPILED, "compiled"), (PYTHON, "called from Python")):
-        lost = lost_to_rivals(numbers, called)
+    for called, how in ((impacts.COMPILED, "compiled"), (impacts.PYTHON, "called from Python")):
+        lost = impacts.lost_to_rivals(numbers, called)
         cases = numbers.where(called=called).select(("contacts", "problem")).rows
         told = []
         for c in dict.fromkeys(lost.column("contacts")):
@@ -221,11 +183,11 @@ def _impacts(numbers: Table, key: str) -> str:
         names, ends, front = [], [], []
         for method, look in _LOOKS.items():
             points = []
-            for rows in by_way(numbers.where(method=method)).values():
+            for rows in impacts.by_way(numbers.where(method=method)).values():
                 good = [row for row in rows if row["outcome"] == "ok"]
                 lost = [row["failed after"] for row in rows if row["outcome"] != "ok"]
                 if lost:
-                    plot.lost([min(float(np.median(lost)), 1e6 * LONGEST)], look, 0.985)
+                    plot.lost([min(float(np.median(lost)), 1e6 * impacts.LONGEST)], look, 0.985)
                 if len(good) < len(rows) / 2:
                     continue
                 time = float(np.median([row["time"] for row in good]))
@@ -233,7 +195,7 @@ def _impacts(numbers: Table, key: str) -> str:
                 middle = float(np.median(errors))
                 points.append((time, middle))
                 plot.axes.vlines(time, middle, max(errors), color=look.color, linewidth=0.7, alpha=0.6)
-                if any(row["relative energy gain"] > NO_GAIN for row in good):
+                if any(row["relative energy gain"] > impacts.NO_GAIN for row in good):
                     plot.axes.plot(time, middle, "o", markersize=9, markerfacecolor="none", markeredgecolor=FORCE)
             front += points
             points.sort()
@@ -241,7 +203,7 @@ def _impacts(numbers: Table, key: str) -> str:
             if points:
                 names.append(look.name)
                 ends.append(points[-1])
-        _draw_front(plot, front, 1e6 * LONGEST)
+        _draw_front(plot, front, 1e6 * impacts.LONGEST)
         plot.log("time of one impact [µs]", "relative error", xlim=(0.05, 4e5), ylim=(1e-17, 10.0))
         plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
         label_marks(plot.axes, names, ends, [STYLES[name].color for name in names])
@@ -272,45 +234,45 @@ def _share(numbers: Table, tolerance: float) -> str:
         for method, look in _LOOKS.items():
             first: dict[tuple[int, str], float] = {}
             for row in numbers.where(method=method, outcome="ok").records():
-                if row["relative error"] <= tolerance and row["relative energy gain"] <= NO_GAIN:
+                if row["relative error"] <= tolerance and row["relative energy gain"] <= impacts.NO_GAIN:
                     case = row["contacts"], row["problem"]
                     first[case] = min(row["time"], first.get(case, np.inf))
             times = sorted(first.values())
             heights = [100.0 * k / cases for k in range(len(times) + 1)]
-            plot.axes.step([0.05, *times, 1e6 * LONGEST], [*heights, heights[-1]], where="post",
+            plot.axes.step([0.05, *times, 1e6 * impacts.LONGEST], [*heights, heights[-1]], where="post",
                            **line_arguments(look, marked=False))
             ends.append((heights[-1], f"{look.name} {heights[-1]:.0f} %", look))
-        plot.log("time budget [µs]", "impacts solved [%]", "x", xlim=(0.05, 1e8 * LONGEST), ylim=(0, 104))
+        plot.log("time budget [µs]", "impacts solved [%]", "x", xlim=(0.05, 1e8 * impacts.LONGEST), ylim=(0, 104))
         plot.axes.set_yticks(range(0, 101, 20), [str(height) for height in range(0, 101, 20)])
         plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
         place = np.inf
         for height, name, look in sorted(ends, key=lambda end: -end[0]):
             place = min(height, place - 6.5)
-            plot.axes.text(1.2e6 * LONGEST, place, name, fontsize=SIZE, color=look.color, va="center")
+            plot.axes.text(1.2e6 * impacts.LONGEST, place, name, fontsize=SIZE, color=look.color, va="center")
     return plot.svg
 
 
-_ENGINES = {method: replace(STYLES[method], filled=False) for method in WORLDS if method in STYLES}
-_WORLDS = {IMPULSES: STYLES["IAPB"], STIFFENED: STYLES["PB, stiffened"], IDEAL: STYLES["ideal, Python"], **_ENGINES}
+_ENGINES = {method: replace(STYLES[method], filled=False) for method in motion.WORLDS if method in STYLES}
+_WORLDS = {motion.IMPULSES: STYLES["IAPB"], motion.STIFFENED: STYLES["PB, stiffened"],
+           IDEAL: STYLES["ideal, Python"], **_ENGINES}  # fmt: skip
 _NAMES = ("IAPB, Euler", "IAPB, midpoint", "IAPB, RK4", "PB, Euler", "PB, RK4", "PB, stiffened")
-_INTEGRATORS = {method: STYLES[name] for method, name in zip(INTEGRATORS, _NAMES, strict=True)}
+_INTEGRATORS = {method: STYLES[name] for method, name in zip(motion.INTEGRATORS, _NAMES, strict=True)}
 _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
 _READ = (
     "Lower left is better. Each mark is a run with one time step; finer steps are further right. Filled marks: "
-    "compiled; hollow marks: called from Python. Small pale marks, filled or hollow: the finer step divides the "
-    f"error by less than {GAINED:g}, so the number at the curve does not use them. “10× costs 4×”: ten times the "
-    f"accuracy takes four times as long, a power (thick straight line) fitted to at least {FIT_RUNS} runs over which "
-    f"the error falls at least {FIT_FALL:g}-fold. “7× costs 2× (2 runs)”: fewer runs or a smaller fall; this is only "
-    "the measured factor from the first to the last of them. The error depends on where an impact falls within a "
-    "step, so curves are uneven. The table gives the median of the fits, in brackets their range, then the number of "
-    "scenes with a fit. Smallest error: the median over the scenes. “Then level”, “stays at”: no shorter step reduces "
-    "this error, which comes from the contact "
-    "model. “Too few runs”, “cut short”: finer steps would take longer than allowed, though the error still falls. "
-    f"The grey steps join the runs that no other run beats in both time and error, among errors up to {USEFUL:g}. "
-    "“Never worth its time”: no run of the method is on the grey steps of any scene. "
-    "Crosses at the upper rim: the run failed or took too long. An arrow at the lower rim: the error is below the "
-    "accuracy of the exact motion (about 1e-10), because a step happens to end at the instant of impact; it is not "
-    "used either. "
+    "compiled; hollow marks: called from Python. Small pale marks, filled or hollow: the finer step divides the error"
+    f" by less than {motion.GAINED:g}, so the number at the curve does not use them. “10× costs 4×”: ten times the "
+    f"accuracy takes four times as long, a power (thick straight line) fitted to at least {motion.FIT_RUNS} runs over "
+    f"which the error falls at least {motion.FIT_FALL:g}-fold. “7× costs 2× (2 runs)”: fewer runs or a smaller fall; "
+    "this is only the measured factor from the first to the last of them. The error depends on where an impact falls "
+    "within a step, so curves are uneven. The table gives the median of the fits, in brackets their range, then the "
+    "number of scenes with a fit. Smallest error: the median over the scenes. “Then level”, “stays at”: no shorter "
+    "step reduces this error, which comes from the contact model. “Too few runs”, “cut short”: finer steps would take"
+    " longer than allowed, though the error still falls. The grey steps join the runs that no other run beats in both"
+    f" time and error, among errors up to {motion.USEFUL:g}. “Never worth its time”: no run of the method is on the "
+    "grey steps of any scene. Crosses at the upper rim: the run failed or took too long. An arrow at the lower rim: "
+    "the error is below the accuracy of the exact motion (about 1e-10), because a step happens to end at the instant "
+    "of impact; it is not used either. "
 )
 
 
@@ -347,10 +309,16 @@ def integrator_precision(motions: Table) -> Drawn:
 
 def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle]) -> Drawn:
     looks = {name: look for name, look in drawn.items() if name in motions.column("method")}
-    found = curves(motions, tuple(looks))
-    told = worth(motions, tuple(looks))
+    found = motion.curves(motions, tuple(looks))
+    told = motion.worth(motions, tuple(looks))
     lines = "; ".join(_worth_said(row, looks)[0] for row in told.records())
-    panels = [Panel(_worth(key, told, looks), lines, wide=True)]
+    table: dict[str, Sequence[Cell]] = {}
+    for row in told.records():
+        look = looks[row["method"]]
+        table[Markup("{} {}").format(swatch(look), look.name)] = [
+            Cell(Markup("<b>{}</b>").format(words) if words == _NEVER else words)
+            for words in _worth_said(row, looks)[1]]
+    panels = [Panel(grid(_HEADINGS, table, "plain"), lines, wide=True)]
     for number, scene in enumerate(dict.fromkeys(motions.column("scene"))):
         here = [curve for curve in found if curve.scene == scene]
         said = ", ".join(f"{looks[curve.method].name}: {curve.words}" for curve in here)
@@ -360,82 +328,55 @@ def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle]) -> Draw
     return Drawn(tuple(panels), told, (*((look.name, look) for look in looks.values()), ("best for its time", _FRONT)))
 
 
-_HEADINGS = ((0.03, ""), (0.155, "called"), (0.265, "ten times the accuracy costs (scenes)"),
-             (0.545, "smallest error"), (0.65, "best for its time (grey), errors"), (0.885, "energy made"))
-
-
-def _worth(key: str, told: Table, looks: Mapping[str, LineStyle]) -> str:
-    """Draw the figure's main numbers as a table with a line per method."""
-    rows = told.records()
-    with Plot(f"{key}-worth", (7.8, 0.24 * (len(rows) + 1) + 0.1), bare=True) as plot:
-        plot.axes.set(xlim=(0.0, 1.0), ylim=(len(rows) - 0.4, -1.5))
-        for place, heading in _HEADINGS:
-            plot.axes.text(place, -1.0, heading, fontsize=7.5, color=MUTED, va="center")
-        for line, row in enumerate(rows):
-            look = looks[row["method"]]
-            plot.axes.plot((0.0, 0.024), (line, line), color=look.color, linewidth=look.width)
-            plot.marks([(0.012, line)], replace(look, name=""))
-            for (place, _), words in zip(_HEADINGS, _worth_said(row, looks)[1], strict=True):
-                plot.axes.text(place, line, words, fontsize=8.0, va="center",
-                               weight="bold" if words == _NEVER else "normal")
-    return plot.svg
-
-
+_HEADINGS = ("called", "ten times the accuracy costs (scenes)", "smallest error", "best for its time (grey), errors",
+             "energy made")
 _NEVER = "never worth its time here"
 
 
 def _worth_said(row: Row, looks: Mapping[str, LineStyle]) -> tuple[str, tuple[str, ...]]:
-    """Return a line of that table, as one text and as the text of each column."""
+    """Return a line of the table of main numbers, as one text and as the text of each column."""
     name, scenes = looks[row["method"]].name, row["scenes"]
     cost = "no step buys it: the error stays" if row["error stays"] == scenes else "too few runs for a fit"
     if row["scenes fitted"]:
-        ends = f" ({times(row['least cost'])} to {times(row['largest cost'])})" if row["scenes fitted"] > 1 else ""
-        cost = f"{times(row['tenfold accuracy costs'])} the time{ends}, {row['scenes fitted']} of {scenes}"
+        typical, *ends = (motion.times(row[key]) for key in ("tenfold accuracy costs", "least cost", "largest cost"))
+        span = f" ({' to '.join(ends)})" if row["scenes fitted"] > 1 else ""
+        cost = f"{typical} the time{span}, {row['scenes fitted']} of {scenes}"
     best = f"undecided: {row['cut short']} of {scenes} cut short" if row["cut short"] else _NEVER
     if row["best for its time"]:
         errors = dict.fromkeys(power_of_error(row[key]) for key in ("most exact there", "least exact there"))
         best = f"{row['best for its time']} of {scenes} scenes, {' to '.join(errors)}"
-    made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > NO_GAIN else "none"
-    cells = (name, row["called"], cost, power_of_error(row["least error"]), best, made)
+    made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > impacts.NO_GAIN else "none"
+    cells = (row["called"], cost, power_of_error(row["least error"]), best, made)
     return f"{name}: ten times the accuracy: {cost}; best for its time: {best}; energy made: {made}", cells
 
 
-def _motions(key: str, here: Sequence[Curve], lost: Table, looks: Mapping[str, LineStyle]) -> str:
+def _motions(key: str, here: Sequence[motion.Curve], lost: Table, looks: Mapping[str, LineStyle]) -> str:
+    def places(runs: Iterable[Row]) -> list[tuple[float, float]]:
+        return [(run["time"], run["position"]) for run in runs if not motion.by_chance(run)]
+
     floor = 0.2 * min(curve.least for curve in here)
     with Plot(key, (4.1, 3.1)) as plot:
-        front = {(run["time"], run["position"]) for curve in here for run in curve.front}
-        _draw_front(plot, front)
+        _draw_front(plot, {(run["time"], run["position"]) for curve in here for run in curve.front})
         for curve in here:
             look = looks[curve.method]
             bare = replace(look, name="")
-            plot.curve(_places(run for run in curve.runs if not by_chance(run)), replace(look, width=0.8), marked=False)
-            plot.marks(_places(curve.used), bare, markersize=5.5)
-            plot.marks(_places(run for run in curve.left_out if not by_chance(run)), bare, markersize=3.8, alpha=_PALE)
-            for run in filter(by_chance, curve.left_out):
+            plot.curve(places(curve.runs), replace(look, width=0.8), marked=False)
+            plot.marks(places(curve.used), bare, markersize=5.5)
+            plot.marks(places(curve.left_out), bare, markersize=3.8, alpha=_PALE)
+            for run in filter(motion.by_chance, curve.left_out):
                 note(plot.axes, (run["time"], 1.3 * floor), "↓", color=look.color)
-            _draw_fit(plot, curve, look)
+            if curve.cost is not None:  # the fitted power law over the range of the fitted runs
+                time, error = (np.log10(column) for column in zip(*places(curve.used), strict=True))
+                ends = np.array([time.min(), time.max()])
+                heights = error.mean() - (ends - time.mean()) / np.log10(curve.cost)
+                plot.axes.plot(10.0**ends, 10.0**heights, color=look.color, linewidth=1.8, alpha=0.6)
             plot.words[look.name] = f": {curve.words}"
-            times_lost = lost.where(method=curve.method).column("time")
-            plot.lost([time for time in times_lost if time], look, 0.98)
+            plot.lost([time for time in lost.where(method=curve.method).column("time") if time], look, 0.98)
         plot.log("computing time [ms per simulated second]", "error of position [lengths]", ylim=(floor, 30.0))
     return plot.svg
 
 
 _PALE = 0.45  # strength of marks that are not used
-
-
-def _places(runs: Iterable[Row]) -> list[tuple[float, float]]:
-    return [(run["time"], run["position"]) for run in runs]
-
-
-def _draw_fit(plot: Plot, curve: Curve, look: LineStyle) -> None:
-    """Draw the fitted power law over the range of the fitted runs."""
-    if curve.cost is None:
-        return
-    time, error = (np.log10(column) for column in zip(*_places(curve.used), strict=True))
-    ends = np.array([time.min(), time.max()])
-    heights = error.mean() - (ends - time.mean()) / np.log10(curve.cost)
-    plot.axes.plot(10.0**ends, 10.0**heights, color=look.color, linewidth=1.8, alpha=0.6)
 
 
 def _draw_front(plot: Plot, points: Iterable[tuple[float, float]], until: float | None = None) -> None:
@@ -458,45 +399,34 @@ def anytime(numbers: Table) -> Drawn:
     sizes: dict[str, list[Row]] = {}
     for row in numbers.records():
         sizes.setdefault(f"{row['contacts']} contacts", []).append(row)
-    left = {name: [100.0 * row["median residual"] / rows[0]["median residual"] for row in rows]
-            for name, rows in sizes.items()}
-    missing = {name: [100.0 * (1.0 - row["share of the loss"]) for row in rows] for name, rows in sizes.items()}
-    panels = (
-        Panel(_budgets(sizes, left, "velocity left [%]"), "Velocity left against the share of rows done.",
-              "normal velocity that is left, of that before the impact"),
-        Panel(_budgets(sizes, missing, "energy loss missing [%]"), "Missing loss against the share of rows done.",
-              "missing part of the energy that the complete impact takes"),
-    )  # fmt: skip
+    done = {size: [row["budget"] / row["rank"] for row in rows] for size, rows in sizes.items()}
+    panels, ranges = [], []
+    for key, name, alt, label, height in (
+        ("velocity", "velocity left [%]", "Velocity left against the share of rows done.",
+         "normal velocity that is left, of that before the impact",
+         lambda row, first: row["median residual"] / first["median residual"]),
+        ("energy", "energy loss missing [%]", "Missing loss against the share of rows done.",
+         "missing part of the energy that the complete impact takes", lambda row, _: 1.0 - row["share of the loss"]),
+    ):  # fmt: skip
+        left = {size: [100.0 * height(row, rows[0]) for row in rows] for size, rows in sizes.items()}
+        half = {size: float(f"{np.interp(0.5, done[size], heights):.2g}") for size, heights in left.items()}
+        ranges.append(f"{min(half.values()):g} to {max(half.values()):g} %")
+        with Plot(f"anytime-{key}") as plot:
+            plot.axes.axvspan(49.0, 51.0, color=MUTED, alpha=0.2, linewidth=0)
+            for size, look in looks_of(sizes).items():
+                plot.curve(zip([100.0 * share for share in done[size]], left[size], strict=True), look)
+                plot.words[size] = f": {half[size]:g} % after half"
+            plot.axes.set(xlabel="rows done when time runs out [%]", ylabel=name, xlim=(-2, 102), ylim=(-3, 105))
+        panels.append(Panel(plot.svg, alt, label))
     needed = ", ".join(f"{rows[0]['rank']} for {name}" for name, rows in sizes.items())
     gained = sum(row["largest relative gain"] > 0.0 for row in numbers.records())
-    return Drawn(panels, numbers, tuple(looks_of(sizes).items()), (
+    return Drawn(tuple(panels), numbers, tuple(looks_of(sizes).items()), (
         "Plastic impacts that stop after some of their rows, because the time budget is over. The rows needed are the "
         f"rank of J ({needed}); the row with the "
         "largest residual comes first. Stopped after half of the rows (grey line), the worst contact keeps "
-        f"{_range_of_halves(sizes, left)} of the normal velocity (median, relative to the median before), and the "
-        f"impact takes {_range_of_halves(sizes, missing)} less energy than it should. The complete impact leaves "
+        f"{ranges[0]} of the normal velocity (median, relative to the median before), and the "
+        f"impact takes {ranges[1]} less energy than it should. The complete impact leaves "
         f"nothing but rounding. {gained or 'None'} of the {len(numbers.rows)} budgets of rows created energy."))
-
-
-def _range_of_halves(sizes: Mapping[str, list[Row]], heights: Mapping[str, list[float]]) -> str:
-    halves = sorted(_at_half(rows, heights[name]) for name, rows in sizes.items())
-    return f"{halves[0]:g} to {halves[-1]:g} %"
-
-
-def _at_half(rows: Sequence[Row], heights: Sequence[float]) -> float:
-    """Return the height after half of the rows, to two digits."""
-    return float(f"{np.interp(0.5, [row['budget'] / row['rank'] for row in rows], heights):.2g}")
-
-
-def _budgets(sizes: Mapping[str, list[Row]], heights: Mapping[str, list[float]], name: str) -> str:
-    with Plot(f"anytime-{name.split()[0]}") as plot:
-        plot.axes.axvspan(49.0, 51.0, color=MUTED, alpha=0.2, linewidth=0)
-        for (size, look), rows in zip(looks_of(sizes).items(), sizes.values(), strict=True):
-            plot.curve([(100.0 * row["budget"] / row["rank"], height)
-                        for row, height in zip(rows, heights[size], strict=True)], look)
-            plot.words[size] = f": {_at_half(rows, heights[size]):g} % after half"
-        plot.axes.set(xlabel="rows done when time runs out [%]", ylabel=name, xlim=(-2.0, 102.0), ylim=(-3.0, 105.0))
-    return plot.svg
 
 
 _HELD = {"contacts": ("coordinates", 12), "coordinates": ("contacts", 60)}  # varied -> what is held, and at what

@@ -1,16 +1,18 @@
 """Figure: one drawing of the report as plain values. Recipe: the inputs of a figure and its drawing function.
 
-A figure consists of a few SVG panels (they wrap on a narrow screen), a legend, a caption that says what to see, and
-the numbers behind it. This module depends neither on matplotlib nor on the page.
+A figure consists of a few panels (they wrap on a narrow screen), each one SVG or a table of coloured cells, a legend, a
+caption that says what to see, and the numbers behind it. This module depends neither on matplotlib nor on the page.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from reports.figures.style import LineStyle
+from markupsafe import Markup
+
+from reports.figures.style import LineStyle, css
 from verification.finding import Table
 
 Legend = tuple[tuple[str, LineStyle], ...]
@@ -18,13 +20,53 @@ Legend = tuple[tuple[str, LineStyle], ...]
 
 @dataclass(frozen=True)
 class Panel:
-    """One SVG drawing; `label` is its heading, `alt` its description for readers who cannot see it."""
+    """One drawing; `label` is its heading, `alt` its description for readers who cannot see it."""
 
-    svg: str
+    svg: str  # or the HTML of a table (`grid`)
     alt: str
     label: str = ""
     wide: bool = False  # take the whole width of the page
     film: bool = False  # played by the browser (reports/figures/film.py)
+
+    @property
+    def is_table(self) -> bool:
+        """Whether the panel is a table."""
+        return self.svg.startswith("<table")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table: its text, a smaller note below, and a colour of the text or, with a strength, of the cell."""
+
+    text: str | Markup = ""
+    note: str = ""
+    color: str = ""
+    strength: float = 0.0
+    hatched: bool = False
+
+    @property
+    def html(self) -> Markup:
+        """The cell as HTML."""
+        look = f"color: {css(self.color)}" if self.color else ""
+        if self.strength:
+            look = f"background: color-mix(in srgb, {css(self.color)} {100 * self.strength:g}%, transparent)"
+        note = Markup("<small>{}</small>").format(self.note) if self.note else ""
+        marked = Markup(' class="hatched"') if self.hatched else ""
+        return Markup('<td{}{}>{}{}</td>').format(marked, Markup(' style="{}"').format(look) if look else "",
+                                                  self.text, note)
+
+
+def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Cell]], kind: str = "") -> str:
+    """Return a table of cells as HTML: a heading for each column and, as text or Markup, for each row.
+
+    kind : "upright" for headings of columns that take less width, "plain" for texts instead of coloured cells
+    """
+    join = Markup("").join
+    head = join(Markup('<th scope="col"><span>{}</span></th>').format(column) for column in columns)
+    body = join(Markup('<tr><th scope="row">{}</th>{}</tr>').format(name, join(cell.html for cell in cells))
+                for name, cells in rows.items())  # fmt: skip
+    return Markup('<table class="grid {}"><thead><tr><td></td>{}</tr></thead><tbody>{}</tbody></table>').format(
+        kind, head, body)  # fmt: skip
 
 
 @dataclass(frozen=True)

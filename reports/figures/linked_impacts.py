@@ -118,12 +118,13 @@ def _balls(axes: Any, centers: Sequence[tuple[float, float]], velocities: Sequen
             arrow(axes, center, [scale * v for v in velocity], color=color, width=1.8, head=10.0)
 
 
-def _kept(axes: Any, place: tuple[float, float], change: float) -> None:
-    """Write "kept", or the relative change of the quantity."""
+def _kept(axes: Any, place: tuple[float, float], change: float, kept: str = "kept", **how: Any) -> None:
+    """Write that a quantity is kept, or its relative change."""
     if abs(change) < ROUNDING:
-        note(axes, place, "kept", color=INK)
+        note(axes, place, kept, color=INK, **how)
     else:
-        note(axes, place, f"changed ×{change:.2g}", color=FORCE, fontweight="bold")
+        what = "momentum " if kept != "kept" else ""
+        note(axes, place, f"{what}changed ×{change:.2g}", color=FORCE, fontweight="bold", **how)
 
 
 def _bernoulli(found: Sequence[Outcome]) -> str:
@@ -139,28 +140,21 @@ def _bernoulli(found: Sequence[Outcome]) -> str:
             axes.set_axis_off()
             _balls(axes, centers, outcome.velocity, outcome.look.color, 1.6)
             note(axes, (0.6, 1.65), _label(outcome).replace(": ", ":\n"), color=outcome.look.color, fontsize=8.5)
-            kept = abs(outcome.momentum) < ROUNDING
-            note(axes, (0.6, -1.6), "all kept" if kept else f"momentum changed ×{outcome.momentum:.2g}",
-                 color=INK if kept else FORCE, fontweight="normal" if kept else "bold", fontsize=8.5)  # fmt: skip
+            _kept(axes, (0.6, -1.6), outcome.momentum, "all kept", fontsize=8.5)
         return to_svg(drawing, "linked-impacts-bernoulli")
-
-
-def _series(numbers: Table) -> dict[tuple[str, str], list[tuple[int, Outcome]]]:
-    """Return the outcomes of all cradles by treatment and rows, each with its number of balls."""
-    series: dict[tuple[str, str], list[tuple[int, Outcome]]] = {}
-    for problem in dict.fromkeys(numbers.column("problem")):
-        for outcome in outcomes(numbers, problem):
-            if problem.startswith("cradle") and "LCP" not in outcome.rows:  # as simultaneous, all rows
-                series.setdefault((outcome.treatment, outcome.rows), []).append((len(outcome.velocity), outcome))
-    return series
 
 
 def _last_ball(numbers: Table) -> str:
     with Plot("linked-impacts-last") as plot:
         axes = plot.axes
-        for (treatment, rows), found in _series(numbers).items():
-            if treatment.startswith("simultaneous, per-body") and "all" in rows:
-                continue  # as with the approaching ones
+        series: dict[tuple[str, str], list[tuple[int, Outcome]]] = {}
+        for problem in dict.fromkeys(numbers.column("problem")):
+            for outcome in outcomes(numbers, problem):
+                # the LCP is as simultaneous with all rows, per-body with all rows as with the approaching ones
+                twin = "LCP" in outcome.rows or "per-body" in outcome.treatment and "all" in outcome.rows
+                if problem.startswith("cradle") and not twin:
+                    series.setdefault(outcome[:2], []).append((len(outcome.velocity), outcome))
+        for (treatment, rows), found in series.items():
             values = [outcome.velocity[-1][0] for _, outcome in found]
             axes.plot([n for n, _ in found], values, **line_arguments(found[0][1].look))
             words = rows.removesuffix(" contacts").removesuffix(" along the row")

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 from reports.figures.canvas import note
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
 from reports.figures.style import BOUND, MUTED, STYLES, LineStyle, line_arguments, looks_of
 from verification.finding import Table
-
-Rows = Sequence[Mapping[str, Any]]
 
 _LOOKS = looks_of(("absolute angles", "place of the hand"))
 _STRAIGHT = 1e-13  # [rad] where the straight arm itself is drawn, on an axis that has no zero
@@ -30,46 +25,36 @@ _SHOWN = ("one", "two, separated")  # contacts of the first panel: well conditio
 )  # fmt: skip
 def coordinate_invariance(numbers: Table) -> Drawn:
     """Draw the motion through the singular pose, and the error of every case against its bound."""
-    rows = numbers.records()
+    rows = [row | {"drawn": None if row["error"] is None else max(row["error"], _SMALLEST)}
+            for row in numbers.records()]  # fmt: skip
     told = [row for row in rows if row["bound"] < 1.0 and row["error"] is not None]
     share = max(row["error"] / row["bound"] for row in told)
     words = f"{len(told)} cases with a bound below 1; the largest error is {share:.1e} of its bound."
-    panels = (Panel(_through_the_pose(rows), words, "Towards the straight arm"),
-              Panel(_against_the_bound(rows), words, "Error against bound"))  # fmt: skip
+    size = (4.3, 3.3)
+    with Plot("coordinate-invariance-pose", size) as pose, Plot("coordinate-invariance-bound", size) as bound:
+        for name, look in _LOOKS.items():
+            mine = [row for row in rows if row["coordinates"] == name]
+            shown = [row for row in mine if row["contacts"] in _SHOWN]
+            bounds: dict[float, float] = {}
+            for row in sorted(shown, key=lambda row: -float(row["elbow"])):
+                bounds[row["elbow"]] = max(row["bound"], bounds.get(row["elbow"], 0.0))
+            pose.curve([(max(elbow, _STRAIGHT), most) for elbow, most in bounds.items()], _dashed(look, 1.3))
+            places = [(max(row["elbow"], _STRAIGHT), row["drawn"]) for row in shown if row["drawn"]]
+            pose.marks(places, look, markersize=5)
+            bound.marks([(row["bound"], row["drawn"]) for row in mine if row["drawn"]], look, markersize=5)
+        pose.axes.axhline(1.0, color=MUTED, linewidth=0.8)
+        pose.axes.xaxis.set_inverted(True)
+        pose.log("angle of the elbow [rad], straight at the right end", "error of v⁺, kinetic metric")
+        note(pose.axes, (1.0, 1.0), "no digit is right above", (0, 7), ha="left", color=MUTED, fontsize=8)
+        high = max(row["bound"] for row in rows)
+        bound.curve([(1e-15, 1e-15), (high, high)], BOUND, marked=False)
+        bound.axes.axvline(1.0, color=MUTED, linewidth=0.8)
+        bound.log("bound C ε κ(M) κ(∂f/∂r)² / σ_min", "error of v⁺", ylim=(0.3 * _SMALLEST, 1e4))
+        note(bound.axes, (1.0, 1e-17), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
+    panels = Panel(pose.svg, words, "Towards the straight arm"), Panel(bound.svg, words, "Error against bound")
     angles, hand = _LOOKS.values()
     legend = (("in absolute angles", angles), ("in the place of the hand", hand), ("bound", BOUND))
     return Drawn(panels, numbers, legend)
-
-
-def _through_the_pose(rows: Rows) -> str:
-    with Plot("coordinate-invariance-pose", (4.3, 3.3)) as plot:
-        axes = plot.axes
-        for name, look in _LOOKS.items():
-            mine = [row for row in rows if row["coordinates"] == name and row["contacts"] in _SHOWN]
-            elbows = sorted({row["elbow"] for row in mine}, reverse=True)
-            bounds = [max(row["bound"] for row in mine if row["elbow"] == elbow) for elbow in elbows]
-            plot.curve(zip([max(e, _STRAIGHT) for e in elbows], bounds, strict=True), _dashed(look, 1.3))
-            plot.marks([(max(row["elbow"], _STRAIGHT), max(row["error"], _SMALLEST)) for row in mine
-                        if row["error"] is not None], look, markersize=5)  # fmt: skip
-        axes.axhline(1.0, color=MUTED, linewidth=0.8)
-        axes.set(xscale="log", yscale="log")
-        axes.xaxis.set_inverted(True)
-        plot.log("angle of the elbow [rad], straight at the right end", "error of v⁺, kinetic metric")
-        note(axes, (1.0, 1.0), "no digit is right above", (0, 7), ha="left", color=MUTED, fontsize=8)
-    return plot.svg
-
-
-def _against_the_bound(rows: Rows) -> str:
-    with Plot("coordinate-invariance-bound", (4.3, 3.3)) as plot:
-        for name, look in _LOOKS.items():
-            plot.marks([(row["bound"], max(row["error"], _SMALLEST)) for row in rows
-                        if row["coordinates"] == name and row["error"] is not None], look, markersize=5)  # fmt: skip
-        low, high = 1e-15, max(row["bound"] for row in rows)
-        plot.curve([(low, low), (high, high)], BOUND, marked=False)
-        plot.axes.axvline(1.0, color=MUTED, linewidth=0.8)
-        plot.log("bound C ε κ(M) κ(∂f/∂r)² / σ_min", "error of v⁺", ylim=(0.3 * _SMALLEST, 1e4))
-        note(plot.axes, (1.0, 1e-17), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
-    return plot.svg
 
 
 def _dashed(look: LineStyle, width: float) -> LineStyle:
@@ -99,23 +84,21 @@ INTEGRATORS = {
 )  # fmt: skip
 def tumbling_drift(numbers: Table) -> Drawn:
     """Draw attitude error and drifts of each integrator against the step, with the declared slopes."""
-    series = [(look.name, look, numbers.where(integrator=integrator, motion="turning over").records())
+    series = [(look, numbers.where(integrator=integrator, motion="turning over").records())
               for integrator, look in INTEGRATORS.items()]  # fmt: skip
-    panels = tuple(_drift(series, column, *names) for column, names in _QUANTITIES.items())
+    panels = []
+    for column, (name, label) in _QUANTITIES.items():
+        with Plot(f"tumbling-drift-{name.split()[-1].lower()}") as plot:
+            for look, rows in series:
+                steps, values, order = ([row[key] for row in rows] for key in ("step", column, "declared order"))
+                size = 5 if look.filled else 9  # so that marks which coincide are both seen
+                plot.marks(zip(steps, values, strict=True), look, markersize=size)
+                plot.curve([(step, values[0] * (step / steps[0]) ** order[0]) for step in steps], _dashed(look, 1.2))
+            plot.log("step [s]", label)
+        ends = "; ".join(f"{look.name} {rows[0][column]:.1e} to {rows[-1][column]:.1e}" for look, rows in series)
+        panels.append(Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name))
     legend = (*((look.name, look) for look in INTEGRATORS.values()), ("declared slope", BOUND))
-    return Drawn(panels, numbers, legend)
-
-
-def _drift(series: Sequence[tuple[str, LineStyle, Rows]], column: str, name: str, label: str) -> Panel:
-    with Plot(f"tumbling-drift-{name.split()[-1].lower()}") as plot:
-        for _, look, rows in series:
-            steps, values, order = ([row[key] for row in rows] for key in ("step", column, "declared order"))
-            size = 5 if look.filled else 9  # so that marks which coincide are both seen
-            plot.marks(zip(steps, values, strict=True), look, markersize=size)
-            plot.curve([(step, values[0] * (step / steps[0]) ** order[0]) for step in steps], _dashed(look, 1.2))
-        plot.log("step [s]", label)
-    ends = "; ".join(f"{who} {rows[0][column]:.1e} to {rows[-1][column]:.1e}" for who, _, rows in series)
-    return Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name)
+    return Drawn(tuple(panels), numbers, legend)
 
 
 FILTERS = looks_of(("no filter", "coherence alone", "clustering alone", "both filters"))

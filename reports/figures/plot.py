@@ -9,7 +9,10 @@ from typing import Any
 from reports.figures.labels import name_curves
 from reports.figures.numbers import power_of_ten
 from reports.figures.style import PANEL, LineStyle, line_arguments, styled
-from reports.figures.svg import to_svg, traced_svg
+from reports.figures.svg import to_svg
+
+TIME, PATH = "time", "path"  # the cursor reads curves over time
+TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
 
 
 class Plot:
@@ -56,8 +59,24 @@ class Plot:
                  trace: TracebackType | None) -> None:  # fmt: skip
         if error is None:
             name_curves(self.axes, self.words)
-            self.svg = traced_svg(self.drawing, self.key, self.kind) if self.kind else to_svg(self.drawing, self.key)
+            self.svg = self._traced() if self.kind else to_svg(self.drawing, self.key)
         self._style.__exit__(kind, error, trace)
+
+    def _traced(self) -> str:
+        """Return the SVG with what the page's script reads values with: the frame in points, limits and names."""
+        import matplotlib
+
+        matplotlib.rcParams["path.simplify_threshold"] = TOLERANCE
+        for line in self.axes.lines:
+            line.get_path().simplify_threshold = TOLERANCE
+        svg = to_svg(self.drawing, self.key)
+        place, (width, height) = self.axes.get_position(), 72.0 * self.drawing.get_size_inches()
+        frame = (width * place.x0, height * (1.0 - place.y1), width * place.x1, height * (1.0 - place.y0))
+        ranges = {"frame": frame, "x": self.axes.get_xlim(), "y": self.axes.get_ylim()}
+        told = {"trace": self.kind, "names": f"{self.axes.get_xlabel()}|{self.axes.get_ylabel()}",
+                **{key: " ".join(f"{value:.7g}" for value in values) for key, values in ranges.items()}}
+        attributes = " ".join(f'data-{key}="{value}"' for key, value in told.items())
+        return svg.replace("<svg ", f"<svg {attributes} ", 1)
 
     def curve(self, points: Iterable[tuple[Any, Any]], look: LineStyle, *, marked: bool = True, **how: Any) -> None:
         """Draw a curve through points (x, y); draw nothing if there are none."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,10 +37,11 @@ LAYERS = (
 LEGEND = (*((text, LineStyle(color, "s", width=0.0)) for _, text, color in LAYERS),
           ("all energy so far", LineStyle(INK, width=1.2)), ("impact", LineStyle(FORCE, "|", width=0.0)))  # fmt: skip
 _WIDTH, _ROW, _HEAD, _FOOT = 9.2, 0.46, 0.34, 0.12  # inches
-_COLUMNS = {"energy": (0.235, 0.52), "depth": (0.785, 0.15)}  # left edge, width
+# heading -> left edge and width
+_COLUMNS = {"energy over time, each scene to its own scale": (0.235, 0.52), "deepest overlap": (0.785, 0.15)}
 _THIN = 3e-3  # share of a strip's height under which a layer cannot be seen and is not drawn
 _STILL = 1e-9  # share of the heights' energy under which all motion is rounding, and is said and not drawn
-_NO_DEPTH, _DEEPEST = 1e-3, 5.0  # [mm] ends of the logarithmic scale
+_DEPTHS = (1e-3, 5.0)  # [mm] ends of the logarithmic scale
 
 
 @dataclass(frozen=True)
@@ -61,20 +61,18 @@ class Strip:
 
 def strips(numbers: Table) -> tuple[Strip, ...]:
     """Return the strips of all scenes from the table of energies over time."""
-    names = tuple(dict.fromkeys(numbers.column("scene")))
-    return tuple(_strip(name, numbers) for name in names)
-
-
-def _strip(name: str, numbers: Table) -> Strip:
-    mine = numbers.where(scene=name)
-    column = {key: np.array(mine.column(key), dtype=float) for key in numbers.keys[1:]}
-    stored = column["potential"] + column["springs"]
-    at_rest = np.ptp(column["given"]) + column["kinetic"].max() <= _STILL * np.abs(stored).max()
-    lowest = stored.min()  # heights count from the lowest: only changes of a potential mean anything
-    layers = np.array([sum(column[heading] for heading in headings) for headings, _, _ in LAYERS])
-    layers[1] -= lowest
-    line = column["kinetic"][0] + stored[0] - lowest + column["given"]
-    return Strip(name, column["time"], layers, line, column["impacts"] > 0, bool(at_rest))
+    found = []
+    for name in dict.fromkeys(numbers.column("scene")):
+        mine = numbers.where(scene=name)
+        column = {key: np.array(mine.column(key), dtype=float) for key in numbers.keys[1:]}
+        stored = column["potential"] + column["springs"]
+        at_rest = np.ptp(column["given"]) + column["kinetic"].max() <= _STILL * np.abs(stored).max()
+        lowest = stored.min()  # heights count from the lowest: only changes of a potential mean anything
+        layers = np.array([sum(column[heading] for heading in headings) for headings, _, _ in LAYERS])
+        layers[1] -= lowest
+        line = column["kinetic"][0] + stored[0] - lowest + column["given"]
+        found.append(Strip(name, column["time"], layers, line, column["impacts"] > 0, bool(at_rest)))
+    return tuple(found)
 
 
 @recipe(
@@ -87,34 +85,35 @@ def _strip(name: str, numbers: Table) -> Strip:
     "logarithmic scale.",
 )  # fmt: skip
 def scenes_ledger(contacts: Table, over_time: Table) -> Drawn:
-    """Draw a row for every scene."""
+    """Draw a row for every scene: its name, the energy over time, and the deepest overlap as a bar."""
     shown, facts = strips(over_time), {row["scene"]: row for row in contacts.records()}
     with styled() as new_figure:
         height = _HEAD + _ROW * len(shown) + _FOOT
         drawing = new_figure(figsize=(_WIDTH, height))
+        for text, (left, _) in _COLUMNS.items():
+            drawing.text(left, 1.0 - 0.55 * _HEAD / height, text, va="center", fontsize=9)
         for place, strip in enumerate(shown):
-            bottom = (height - _HEAD - (place + 1) * _ROW) / height
-            _row(drawing, bottom, _ROW / height, strip, facts)
-        _headings(drawing, 1.0 - 0.55 * _HEAD / height)
+            fact, row = facts[strip.scene], _ROW / height
+            bottom = (height - _HEAD) / height - (place + 1) * row
+            energy, depth = (drawing.add_axes((left, bottom + 0.14 * row, width, 0.78 * row))
+                             for left, width in _COLUMNS.values())  # fmt: skip
+            space = "in space, " if fact["dimensions"] == 3 else ""
+            told = f"{format_number(fact['energy exchanged'], 2)} J, {space}{fact['how it ends']}"
+            drawing.text(0.006, bottom + 0.55 * row, strip.scene.replace("_", " "), va="bottom", fontsize=9)
+            drawing.text(0.006, bottom + 0.55 * row, told, va="top", fontsize=7.5, color=MUTED)
+            _energy(energy, strip)
+            value, (low, high) = fact["most penetration"], np.log10(_DEPTHS)
+            length = max(np.log10(value) - low, 0.0) / (high - low) if value > 0.0 else 0.0
+            depth.barh(0.0, length, height=0.42, color=LINK)
+            depth.text(length + 0.03, 0.0, f"{format_number(value, 2)} mm" if value else "touches nothing", va="center",
+                       fontsize=8)  # fmt: skip
+            depth.set(xlim=(0.0, 1.0), ylim=(-0.5, 0.5))
+            depth.set_axis_off()
         svg = to_svg(drawing, "every-scene")
-    return Drawn((Panel(svg, _words(shown, facts), wide=True),), contacts, LEGEND)
-
-
-def _row(drawing: Any, bottom: float, height: float, strip: Strip, facts: Mapping[str, Mapping[str, Any]]) -> None:
-    fact = facts[strip.scene]
-    middle = bottom + 0.55 * height
-    drawing.text(0.006, middle, strip.scene.replace("_", " "), va="bottom", fontsize=9)
-    drawing.text(0.006, middle, _facts_in_words(fact), va="top", fontsize=7.5, color=MUTED)
-    left, width = _COLUMNS["energy"]
-    _energy(drawing.add_axes((left, bottom + 0.14 * height, width, 0.78 * height)), strip)
-    depth = fact["most penetration"]
-    _bar(drawing, "depth", bottom, height, depth, (_NO_DEPTH, _DEEPEST), LINK,
-         f"{format_number(depth, 2)} mm" if depth else "touches nothing")  # fmt: skip
-
-
-def _facts_in_words(fact: Mapping[str, Any]) -> str:
-    space = "in space, " if fact["dimensions"] == 3 else ""
-    return f"{format_number(fact['energy exchanged'], 2)} J, {space}{fact['how it ends']}"
+    deepest = max(facts.values(), key=lambda fact: float(fact["most penetration"]))
+    words = (f"{len(shown)} strips of energy over time. Deepest overlap {deepest['most penetration']:.2g} mm in "
+             f"{deepest['scene']}.")  # fmt: skip
+    return Drawn((Panel(svg, words, wide=True),), contacts, LEGEND)
 
 
 def _energy(axes: Any, strip: Strip) -> None:
@@ -133,30 +132,3 @@ def _energy(axes: Any, strip: Strip) -> None:
     axes.plot(strip.time[strip.struck], np.full(strip.struck.sum(), -0.1 * top), "|", color=FORCE, markersize=4.5)
     axes.axhline(0.0, color=MUTED, linewidth=0.5)
     axes.set(xlim=(0.0, strip.time[-1]), ylim=(-0.2 * top, 1.08 * top))
-
-
-def _bar(drawing: Any, column: str, bottom: float, height: float, value: float, scale: tuple[float, float],
-         color: str, text: str) -> None:  # fmt: skip
-    """Draw a value as a bar on a logarithmic scale, with its number to the right."""
-    left, width = _COLUMNS[column]
-    axes = drawing.add_axes((left, bottom + 0.14 * height, width, 0.78 * height))
-    axes.set_axis_off()
-    low, high = np.log10(scale)
-    length = max(np.log10(value) - low, 0.0) / (high - low) if value > 0.0 else 0.0
-    axes.barh(0.0, length, height=0.42, color=color)
-    axes.text(length + 0.03, 0.0, text, va="center", fontsize=8)
-    axes.set(xlim=(0.0, 1.0), ylim=(-0.5, 0.5))
-
-
-def _headings(drawing: Any, height: float) -> None:
-    texts = {"energy": "energy over time, each scene to its own scale", "depth": "deepest overlap"}
-    for column, text in texts.items():
-        drawing.text(_COLUMNS[column][0], height, text, va="center", fontsize=9)
-
-
-def _words(shown: Sequence[Strip], facts: Mapping[str, Mapping[str, Any]]) -> str:
-    deepest = max(facts.values(), key=lambda fact: fact["most penetration"])
-    return (
-        f"{len(shown)} strips of energy over time. Deepest overlap {deepest['most penetration']:.2g} mm in "
-        f"{deepest['scene']}."
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.geometry import body_outlines, body_placements, bounds
 from reports.figures.numbers import MINUS
 from reports.figures.style import BLUE, INK, MUTED, PANEL
-from verification.finding import Table, titled
+from verification.finding import titled
 
 _LONGEST = 0.22  # arrow length, as a share of the picture
 
@@ -28,13 +28,29 @@ def contact_forces(run: Run) -> Drawn:
     """Draw the hardest collision and the last resting instant of the run."""
     instants = (("(a) colliding: impulses", hardest_collision(run), run.contacts.impulse, "N s"),
                 ("(b) resting: forces", last_contact(run), run.contacts.normal_force, "N"))
-    shown = [(title, step, values, unit) for title, step, values, unit in instants if step is not None]
-    panels = tuple(Panel(_group(run, step, values, f"fig01-{number}"), _words(run, step, values, unit), title)
-                   for number, (title, step, values, unit) in enumerate(shown))
-    rows = tuple((title[4:], float(run.time[step]), *map(float, 1e3 * run.contacts.point[k, :2]), float(values[k]),
-                  unit) for title, step, values, unit in shown for k in contacts_of(run, step))
+    panels, rows, scene = [], list[tuple[object, ...]](), run.scene_resolved
+    for title, step, values, unit in instants:
+        if step is None:
+            continue
+        pose, contacts = run.pose[step], contacts_of(run, step)
+        low, high = bounds([outline for _, outline in body_outlines(scene, pose)], 0.12)
+        longest, largest = _LONGEST * max(high - low), max((abs(values[k]) for k in contacts), default=0.0)
+        with Canvas(f"fig01-{len(panels)}", low, high, turned=is_turned(scene)) as canvas:
+            draw_walls(canvas.axes, scene, reach=1.0)
+            draw_bodies(canvas.axes, scene, pose)
+            for k in contacts:
+                point = run.contacts.point[k, :2]
+                canvas.axes.plot(*point, "o", color=INK, markersize=3.5, zorder=7)
+                if values[k]:
+                    arrow(canvas.axes, point, longest * values[k] / largest * run.contacts.normal[k, :2], color=BLUE)
+            hand(canvas.axes, scene, body_placements(scene, pose)[scene["hand"]["body"]], 0.8 * longest)
+        told = ", ".join(f"{values[k]:.3g} {unit}" for k in contacts)
+        panels.append(Panel(canvas.svg, f"The group at t = {run.time[step]:.3f} s with its contacts; along their "
+                            f"normals: {told}.", title))  # fmt: skip
+        rows += [(title[4:], float(run.time[step]), *map(float, 1e3 * run.contacts.point[k, :2]), float(values[k]),
+                  unit) for k in contacts]  # fmt: skip
     columns = ("instant", "t [s]", "contact x [mm]", "y [mm]", "along the normal", "unit")
-    return Drawn(panels, titled(columns, rows))
+    return Drawn(tuple(panels), titled(columns, rows))
 
 
 def contacts_of(run: Run, step: int) -> range:
@@ -54,33 +70,6 @@ def last_contact(run: Run) -> int | None:
     """Return the last step with a contact; None without contacts."""
     steps = np.flatnonzero(np.diff(run.contacts.offsets))
     return int(steps[-1]) if len(steps) else None
-
-
-def _group(run: Run, step: int, values: np.ndarray, key: str) -> str:
-    scene, pose = run.scene_resolved, run.pose[step]
-    low, high = bounds([outline for _, outline in body_outlines(scene, pose)], 0.12)
-    longest = _LONGEST * max(high - low)
-    with Canvas(key, low, high, turned=is_turned(scene)) as canvas:
-        draw_walls(canvas.axes, scene, reach=1.0)
-        draw_bodies(canvas.axes, scene, pose)
-        _contact_arrows(canvas.axes, run, step, values, longest)
-        hand(canvas.axes, scene, body_placements(scene, pose)[scene["hand"]["body"]], 0.8 * longest)
-    return canvas.svg
-
-
-def _contact_arrows(axes: Any, run: Run, step: int, values: np.ndarray, longest: float) -> None:
-    rows = contacts_of(run, step)
-    largest = max((abs(values[k]) for k in rows), default=0.0)
-    for k in rows:
-        point = run.contacts.point[k, :2]
-        axes.plot(*point, "o", color=INK, markersize=3.5, zorder=7)
-        if values[k]:
-            arrow(axes, point, longest * values[k] / largest * run.contacts.normal[k, :2], color=BLUE)
-
-
-def _words(run: Run, step: int, values: np.ndarray, unit: str) -> str:
-    parts = ", ".join(f"{values[k]:.3g} {unit}" for k in contacts_of(run, step))
-    return f"The group at t = {run.time[step]:.3f} s with its contacts; along their normals: {parts}."
 
 
 _ARROW = 0.02  # [m] on paper per newton
@@ -104,38 +93,27 @@ def peg_corner(scene: Mapping[str, Any]) -> Drawn:
         center, force = (np.asarray(each[:2]) for each in (scene["bodies"][0]["position"], scene["hand"]["force"]))
         arrow(axes, center, _ARROW * force)
         note(axes, center + _ARROW * force, "F hand", (6, -8), ha="left")
-        _frame(axes)
+        for vector, name, offset in (((_AXIS, 0), "x", (0, 7)), ((0, _AXIS), "y", (7, 2))):  # axes of the world
+            arrow(axes, (0.0, 0.0), vector, color=MUTED, width=1.1, head=7)
+            note(axes, vector, name, offset, color=MUTED)
         scale_bar(axes, (high[0] - 0.002, high[1] - 0.003), 0.01, "10 mm", turned=True)
     panel = Panel(canvas.svg, "A small tilted rectangle above a floor and left of a wall, with the hand's force "
                   "pointing to the lower right.")  # fmt: skip
-    return Drawn((panel,), _numbers(scene))
-
-
-def _frame(axes: Any) -> None:
-    """Draw the axes of the world at the corner."""
-    for vector, name, offset in (((_AXIS, 0), "x", (0, 7)), ((0, _AXIS), "y", (7, 2))):
-        arrow(axes, (0.0, 0.0), vector, color=MUTED, width=1.1, head=7)
-        note(axes, vector, name, offset, color=MUTED)
-
-
-def _numbers(scene: Mapping[str, Any]) -> Table:
     body, contact = scene["bodies"][0], scene["contact"]
     x, y, angle = body["position"]
-    rows = (
-        ("peg size [mm]", _list(1e3 * side for side in body["shapes"][0]["size"]), "paper"),
-        ("peg mass [kg], inertia [kg m²]", _list((body["mass"], body["inertia"])), "paper"),
-        ("peg starts at x, y [mm], θ [rad]", _list((1e3 * x, 1e3 * y, angle)), "ours"),
-        ("wall stiffness [N/m], damping [N s/m]", _list((contact["stiffness"], contact["damping"])), "paper"),
-        ("restitution", _list([contact["restitution"]]), "paper"),
-        ("friction, its velocity threshold [m/s]", _list((contact["friction"], contact["friction_velocity"])), "ours"),
-        ("hand force [N, N, N m]", _list(scene["hand"]["force"]), "paper"),
-        ("rate [Hz]", _list([scene["rate"]]), "paper"),
+    given = (
+        ("peg size [mm]", [1e3 * side for side in body["shapes"][0]["size"]], "paper"),
+        ("peg mass [kg], inertia [kg m²]", (body["mass"], body["inertia"]), "paper"),
+        ("peg starts at x, y [mm], θ [rad]", (1e3 * x, 1e3 * y, angle), "ours"),
+        ("wall stiffness [N/m], damping [N s/m]", (contact["stiffness"], contact["damping"]), "paper"),
+        ("restitution", [contact["restitution"]], "paper"),
+        ("friction, its velocity threshold [m/s]", (contact["friction"], contact["friction_velocity"]), "ours"),
+        ("hand force [N, N, N m]", scene["hand"]["force"], "paper"),
+        ("rate [Hz]", [scene["rate"]], "paper"),
     )
-    return titled(("quantity", "value", "given by"), rows)
-
-
-def _list(values: Iterable[float]) -> str:
-    return ", ".join(f"{value:g}" for value in values).replace("-", MINUS)
+    rows = tuple((quantity, ", ".join(f"{value:g}" for value in values).replace("-", MINUS), by)
+                 for quantity, values, by in given)  # fmt: skip
+    return Drawn((panel,), titled(("quantity", "value", "given by"), rows))
 
 
 @recipe(
@@ -144,19 +122,17 @@ def _list(values: Iterable[float]) -> str:
     "redundant. Beside it a mass before a wall, the usual one-dimensional model for the stability of haptic walls.",
 )  # fmt: skip
 def gallery(*scenes: Mapping[str, Any]) -> Drawn:
-    """Draw every scene at its start."""
-    return Drawn(tuple(_start(scene) for scene in scenes))
-
-
-def _start(scene: Mapping[str, Any]) -> Panel:
-    """Draw one scene at its start: walls, bodies and the hand's force."""
-    low, high = bounds([corners for _, corners in body_outlines(scene)], 0.25)
-    reach = max(high - low)
-    with Canvas(f"scenes-{scene['name']}", low - 0.35 * reach, high + 0.35 * reach, PANEL,
-                turned=is_turned(scene)) as canvas:  # fmt: skip
-        draw_walls(canvas.axes, scene, reach=20 * reach)
-        draw_bodies(canvas.axes, scene)
-        if scene["hand"]:
-            hand(canvas.axes, scene, body_placements(scene)[scene["hand"]["body"]], 0.28 * reach)
-    words = f"{scene['title']}: {len(scene['bodies'])} moving bodies, {len(scene['walls'])} walls, at the start."
-    return Panel(canvas.svg, words, scene["title"])
+    """Draw every scene at its start: walls, bodies and the hand's force."""
+    panels = []
+    for scene in scenes:
+        low, high = bounds([corners for _, corners in body_outlines(scene)], 0.25)
+        reach = max(high - low)
+        with Canvas(f"scenes-{scene['name']}", low - 0.35 * reach, high + 0.35 * reach, PANEL,
+                    turned=is_turned(scene)) as canvas:  # fmt: skip
+            draw_walls(canvas.axes, scene, reach=20 * reach)
+            draw_bodies(canvas.axes, scene)
+            if scene["hand"]:
+                hand(canvas.axes, scene, body_placements(scene)[scene["hand"]["body"]], 0.28 * reach)
+        words = f"{scene['title']}: {len(scene['bodies'])} moving bodies, {len(scene['walls'])} walls, at the start."
+        panels.append(Panel(canvas.svg, words, scene["title"]))
+    return Drawn(tuple(panels))

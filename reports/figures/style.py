@@ -24,6 +24,11 @@ VARIABLES = {
 }
 
 
+def css(color: str) -> str:
+    """Return a colour of this table as CSS: the page's variable, with the colour itself as fallback."""
+    return f"var(--{VARIABLES[color]}, {color})"
+
+
 @dataclass(frozen=True)
 class LineStyle:
     """Colour, dash pattern, marker and width of one curve; `dash` is in points, () = solid."""

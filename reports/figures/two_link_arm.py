@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from iapb import resolve_impact
 from reports.figures.canvas import Canvas, arrow, note
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.geometry import Placement, body_placements
+from reports.figures.geometry import body_placements
 from reports.figures.plot import Plot
 from reports.figures.style import BLUE, BOUND, INK, LINK, MUTED, PAPER, PEG, STYLES, VERMILION, line_arguments
 from verification.finding import titled
@@ -74,38 +74,24 @@ def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
     points = np.vstack([pivot, *ends])
     low, high = points.min(axis=0) - (1.25, 0.22), points.max(axis=0) + (1.25, 0.12)
     with Canvas("fig02", low, high, (3.6, 3.3)) as canvas:
-        _ground(canvas.axes, pivot)
+        axes = canvas.axes
+        axes.fill(pivot[0] + np.array([-0.14, 0.14, 0.14, -0.14]), pivot[1] + np.array([-0.16, -0.16, -0.08, -0.08]),
+                  facecolor=MUTED, edgecolor="none", alpha=0.6)
+        axes.plot([pivot[0], pivot[0]], [pivot[1] - 0.08, pivot[1]], color=INK, linewidth=2)
         for number, (frame, end) in enumerate(zip(poses, ends, strict=True), start=1):
-            _link(canvas.axes, frame, end, number)
-        for name, distance in CONTACTS.items():
-            _blow(canvas.axes, poses[1], name, distance)
+            start = frame.origin[:2]
+            line = np.vstack([start, end])
+            axes.plot(*line.T, color=LINK, linewidth=10, solid_capstyle="round", zorder=2)
+            axes.plot(*line.T, color=PEG, linewidth=8, solid_capstyle="round", zorder=2)
+            axes.plot(*start, "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5)
+            note(axes, line.mean(axis=0), f"l{number} = 1 m, m{number} = 1 kg", (14, 0), ha="left")
+            note(axes, start, f"q̇{number} = 1 rad/s", (14, 0), ha="left", color=MUTED)
+        for (name, distance), color in zip(CONTACTS.items(), (BLUE, VERMILION), strict=True):  # opposite to the motion
+            point, normal = poses[1].of((distance, 0.0)), -poses[1].rotation[:2, 1]
+            arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
+            note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right")
     words = ", ".join(f"{name} is {distance} m along the second link" for name, distance in CONTACTS.items())
     return Drawn((Panel(canvas.svg, f"Two links in a straight line from a fixed pivot; {words}."),))
-
-
-def _ground(axes: Any, point: Any) -> None:
-    axes.fill(point[0] + np.array([-0.14, 0.14, 0.14, -0.14]), point[1] + np.array([-0.16, -0.16, -0.08, -0.08]),
-              facecolor=MUTED, edgecolor="none", alpha=0.6)
-    axes.plot([point[0], point[0]], [point[1] - 0.08, point[1]], color=INK, linewidth=2)
-
-
-def _link(axes: Any, frame: Placement, end: Any, number: int) -> None:
-    """Draw a link as a rounded bar with its joint, its name and its joint velocity."""
-    start = frame.origin[:2]
-    line = np.vstack([start, end])
-    axes.plot(*line.T, color=LINK, linewidth=10, solid_capstyle="round", zorder=2)
-    axes.plot(*line.T, color=PEG, linewidth=8, solid_capstyle="round", zorder=2)
-    axes.plot(*start, "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5)
-    note(axes, line.mean(axis=0), f"l{number} = 1 m, m{number} = 1 kg", (14, 0), ha="left")
-    note(axes, start, f"q̇{number} = 1 rad/s", (14, 0), ha="left", color=MUTED)
-
-
-def _blow(axes: Any, frame: Placement, name: str, distance: float) -> None:
-    """Draw the impulse at `distance` along the link, opposite to the motion."""
-    color = BLUE if name == "A" else VERMILION
-    point, normal = frame.of((distance, 0.0)), -frame.rotation[:2, 1]
-    arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
-    note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right")
 
 
 @recipe(

@@ -31,6 +31,8 @@ _PANELS = {
 )  # fmt: skip
 def worlds(table: Table, series: Table) -> Drawn:
     """Draw five curves over time for each world, and bars of the time of a step."""
+    from matplotlib.ticker import NullLocator
+
     names = [str(name) for name in table.column("world")]
     against = next((row["world"] for row in table.records() if row["configuration, rms"] is None), "")
     looks = looks_of(names)
@@ -40,9 +42,15 @@ def worlds(table: Table, series: Table) -> Drawn:
         for axis, (key, (title, factor)) in zip(axes, _PANELS.items(), strict=False):
             shown = [name for name in names if key not in _DISTANCES or name != against]
             _curves(axis, series, key, factor, {name: looks[name] for name in shown})
-            axis.set_title(title)
-            axis.set_xlabel("time [s]")
-        _bars(axes[5], table, looks)
+            axis.set(title=title, xlabel="time [s]")
+        spent = dict(zip(table.column("world"), table.column("time per step"), strict=True))
+        bars = axes[5].barh(list(spent), list(spent.values()), color=[looks[name].color for name in spent], height=0.6)
+        axes[5].bar_label(bars, [f"{value:.3g}" for value in spent.values()], padding=3)
+        axes[5].set(xscale="log", title="time of a step [µs]",
+                    xlim=(0.5 * min(spent.values()), 8.0 * max(spent.values())))  # fmt: skip
+        axes[5].xaxis.set_major_locator(NullLocator())
+        axes[5].xaxis.set_minor_locator(NullLocator())
+        axes[5].invert_yaxis()
         svg = to_svg(drawing, "worlds")
     alt = f"Worlds {', '.join(names)} over time: {'; '.join(title for title, _ in _PANELS.values())}; time per step."
     legend = tuple((f"{name} (reference)" if name == against else name, looks[name]) for name in names)
@@ -63,15 +71,3 @@ def _curves(axis: Any, series: Table, key: str, factor: float, looks: dict[str, 
         times, values = mine.column("time"), [factor * value for value in mine.column(key)]
         apart = max(1, len(times) // 6)
         axis.plot(times, values, markevery=(k * apart // len(looks), apart), **line_arguments(look))
-
-
-def _bars(axis: Any, table: Table, looks: dict[str, LineStyle]) -> None:
-    from matplotlib.ticker import NullLocator
-
-    spent = dict(zip(table.column("world"), table.column("time per step"), strict=True))
-    bars = axis.barh(list(spent), list(spent.values()), color=[looks[name].color for name in spent], height=0.6)
-    axis.bar_label(bars, [f"{value:.3g}" for value in spent.values()], padding=3)
-    axis.set(xscale="log", title="time of a step [µs]", xlim=(0.5 * min(spent.values()), 8.0 * max(spent.values())))
-    axis.xaxis.set_major_locator(NullLocator())
-    axis.xaxis.set_minor_locator(NullLocator())
-    axis.invert_yaxis()

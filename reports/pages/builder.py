@@ -14,8 +14,8 @@ from markupsafe import Markup
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, NotComputed, Recipe, draw
-from reports.figures.legend import swatch
 from reports.figures.numbers import format_cell, format_number, is_number
+from reports.figures.standalone import swatch
 from reports.pages.first import answer, facts
 from reports.pages.formulas import formula, prose
 from reports.pages.inline import policy, script
@@ -196,6 +196,7 @@ def _environment() -> Environment:
 
 
 def _labelled(panel: Any) -> Markup:
-    """Return a panel's SVG as an image with its description."""
-    label = Markup.escape(panel.alt)
-    return Markup(panel.svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))
+    """Return a panel with its description: its SVG as an image, or its table."""
+    label = Markup('aria-label="{}"').format(panel.alt)
+    return Markup(panel.svg.replace("<svg ", f'<svg role="img" {label} ', 1) if not panel.is_table else
+                  panel.svg.replace("<table ", f"<table {label} ", 1))  # fmt: skip
