@@ -21,7 +21,7 @@ _TABLE = (
     "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } small { display: block } "
     "th[scope=row], .plain * { text-align: left } .swatch { width: 36px; height: 14px } "
     ".hatched { background: repeating-linear-gradient(135deg, #ccc 0 1px, transparent 1px 5px) } "
-    "li { list-style: none }"
+    "li { list-style: none } .upright thead span { writing-mode: vertical-rl; rotate: 180deg }"
 )
 _MARKERS = {
     "o": '<circle cx="18" cy="7" r="3.6"/>',
@@ -31,6 +31,7 @@ _MARKERS = {
     "<": '<path d="M13.6 7 21.4 11V3z"/>',
     ">": '<path d="M22.4 7 14.6 11V3z"/>',
     "D": '<path d="M18 2.4 22.6 7 18 11.6 13.4 7z"/>',
+    "d": '<path d="M18 2 20.6 7 18 12 15.4 7z"/>',
     "P": '<path d="M16.4 3h3.2v2.4H22v3.2h-2.4V11h-3.2V8.6H14V5.4h2.4z"/>',
     "X": '<path d="M14.5 5 16 3.5l2 2 2-2L21.5 5l-2 2 2 2L20 10.5l-2-2-2 2L14.5 9l2-2z"/>',
     "|": '<path d="M17 2h2v10h-2z"/>',
