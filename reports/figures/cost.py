@@ -170,47 +170,40 @@ def _lost_on_hard_impacts(numbers: Table) -> str:
 )  # fmt: skip
 def impact_accuracy(numbers: Table) -> Drawn:
     """Draw a panel per size."""
-    sizes = dict.fromkeys(numbers.select(("contacts", "coordinates")).rows)
-    panels = tuple(
-        Panel(_impacts(numbers.where(contacts=c, coordinates=d), f"impact-accuracy-{c}"),
-              f"Error against time with {c} contacts on {d} coordinates for {', '.join(_LOOKS)}.",
-              f"{c} contact{'s' * (c > 1)}, {d} coordinates") for c, d in sizes)  # fmt: skip
-    return Drawn(panels, numbers, tuple((look.name, look) for look in _LOOKS.values()))
-
-
-def _impacts(numbers: Table, key: str) -> str:
-    with Plot(key, (4.1, 3.2)) as plot:
-        names, ends, front = [], [], []
-        for method, look in _LOOKS.items():
-            points = []
-            for rows in impacts.by_way(numbers.where(method=method)).values():
-                good = [row for row in rows if row["outcome"] == "ok"]
-                lost = [row["failed after"] for row in rows if row["outcome"] != "ok"]
-                if lost:
-                    plot.lost([min(float(np.median(lost)), 1e6 * impacts.LONGEST)], look, 0.985)
-                if len(good) < len(rows) / 2:
-                    continue
-                time = float(np.median([row["time"] for row in good]))
-                errors = [max(row["relative error"], 1e-17) for row in good]
-                middle = float(np.median(errors))
-                points.append((time, middle))
-                plot.axes.vlines(time, middle, max(errors), color=look.color, linewidth=0.7, alpha=0.6)
-                if any(row["relative energy gain"] > impacts.NO_GAIN for row in good):
-                    plot.axes.plot(time, middle, "o", markersize=9, markerfacecolor="none", markeredgecolor=FORCE)
-            front += points
-            points.sort()
-            plot.curve(points, look)
-            if points:
-                names.append(look.name)
-                ends.append(points[-1])
-        _draw_front(plot, front, 1e6 * impacts.LONGEST)
-        plot.log("time of one impact [µs]", "relative error", xlim=(0.05, 4e5), ylim=(1e-17, 10.0))
-        plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
-        label_marks(plot.axes, names, ends, [STYLES[name].color for name in names])
-    return plot.svg
-
-
-_TOLERANCES = (1e-3, 1e-6, 1e-9)
+    panels = []
+    for c, d in dict.fromkeys(numbers.select(("contacts", "coordinates")).rows):
+        here = numbers.where(contacts=c, coordinates=d)
+        with Plot(f"impact-accuracy-{c}", (4.1, 3.2)) as plot:
+            names, ends, front = [], [], []
+            for method, look in _LOOKS.items():
+                points = []
+                for rows in impacts.by_way(here.where(method=method)).values():
+                    good = [row for row in rows if row["outcome"] == "ok"]
+                    lost = [row["failed after"] for row in rows if row["outcome"] != "ok"]
+                    if lost:
+                        plot.lost([min(float(np.median(lost)), 1e6 * impacts.LONGEST)], look, 0.985)
+                    if len(good) < len(rows) / 2:
+                        continue
+                    time = float(np.median([row["time"] for row in good]))
+                    errors = [max(row["relative error"], 1e-17) for row in good]
+                    middle = float(np.median(errors))
+                    points.append((time, middle))
+                    plot.axes.vlines(time, middle, max(errors), color=look.color, linewidth=0.7, alpha=0.6)
+                    if any(row["relative energy gain"] > impacts.NO_GAIN for row in good):
+                        plot.axes.plot(time, middle, "o", markersize=9, markerfacecolor="none", markeredgecolor=FORCE)
+                front += points
+                points.sort()
+                plot.curve(points, look)
+                if points:
+                    names.append(look.name)
+                    ends.append(points[-1])
+            _draw_front(plot, front, 1e6 * impacts.LONGEST)
+            plot.log("time of one impact [µs]", "relative error", xlim=(0.05, 4e5), ylim=(1e-17, 10.0))
+            plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
+            label_marks(plot.axes, names, ends, [STYLES[name].color for name in names])
+        alt = f"Error against time with {c} contacts on {d} coordinates for {', '.join(_LOOKS)}."
+        panels.append(Panel(plot.svg, alt, f"{c} contact{'s' * (c > 1)}, {d} coordinates"))
+    return Drawn(tuple(panels), numbers, tuple((look.name, look) for look in _LOOKS.values()))
 
 
 @recipe(
@@ -221,35 +214,31 @@ _TOLERANCES = (1e-3, 1e-6, 1e-9)
 )  # fmt: skip
 def budget_share(numbers: Table) -> Drawn:
     """Draw a panel per tolerance."""
-    panels = tuple(Panel(_share(numbers, error), f"Share of impacts solved to {error:g} against time for "
-                         f"{', '.join(_LOOKS)}.", f"error below {power_of_error(error)}")
-                   for error in _TOLERANCES)  # fmt: skip
-    return Drawn(panels, None, tuple((look.name, look) for look in _LOOKS.values()))
-
-
-def _share(numbers: Table, tolerance: float) -> str:
-    cases = len(set(numbers.select(("contacts", "problem")).rows))
-    with Plot(f"budget-share-{power_of_error(tolerance)}", (4.1, 3.0)) as plot:
-        ends: list[tuple[float, str, LineStyle]] = []
-        for method, look in _LOOKS.items():
-            first: dict[tuple[int, str], float] = {}
-            for row in numbers.where(method=method, outcome="ok").records():
-                if row["relative error"] <= tolerance and row["relative energy gain"] <= impacts.NO_GAIN:
-                    case = row["contacts"], row["problem"]
-                    first[case] = min(row["time"], first.get(case, np.inf))
-            times = sorted(first.values())
-            heights = [100.0 * k / cases for k in range(len(times) + 1)]
-            plot.axes.step([0.05, *times, 1e6 * impacts.LONGEST], [*heights, heights[-1]], where="post",
-                           **line_arguments(look, marked=False))
-            ends.append((heights[-1], f"{look.name} {heights[-1]:.0f} %", look))
-        plot.log("time budget [µs]", "impacts solved [%]", "x", xlim=(0.05, 1e8 * impacts.LONGEST), ylim=(0, 104))
-        plot.axes.set_yticks(range(0, 101, 20), [str(height) for height in range(0, 101, 20)])
-        plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
-        place = np.inf
-        for height, name, look in sorted(ends, key=lambda end: -end[0]):
-            place = min(height, place - 6.5)
-            plot.axes.text(1.2e6 * impacts.LONGEST, place, name, fontsize=SIZE, color=look.color, va="center")
-    return plot.svg
+    cases, panels = len(set(numbers.select(("contacts", "problem")).rows)), []
+    for tolerance in (1e-3, 1e-6, 1e-9):
+        with Plot(f"budget-share-{power_of_error(tolerance)}", (4.1, 3.0)) as plot:
+            ends: list[tuple[float, str, LineStyle]] = []
+            for method, look in _LOOKS.items():
+                first: dict[tuple[int, str], float] = {}
+                for row in numbers.where(method=method, outcome="ok").records():
+                    if row["relative error"] <= tolerance and row["relative energy gain"] <= impacts.NO_GAIN:
+                        case = row["contacts"], row["problem"]
+                        first[case] = min(row["time"], first.get(case, np.inf))
+                times = sorted(first.values())
+                heights = [100.0 * k / cases for k in range(len(times) + 1)]
+                plot.axes.step([0.05, *times, 1e6 * impacts.LONGEST], [*heights, heights[-1]], where="post",
+                               **line_arguments(look, marked=False))
+                ends.append((heights[-1], f"{look.name} {heights[-1]:.0f} %", look))
+            plot.log("time budget [µs]", "impacts solved [%]", "x", xlim=(0.05, 1e8 * impacts.LONGEST), ylim=(0, 104))
+            plot.axes.set_yticks(range(0, 101, 20), [str(height) for height in range(0, 101, 20)])
+            plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
+            place = np.inf
+            for height, name, look in sorted(ends, key=lambda end: -end[0]):
+                place = min(height, place - 6.5)
+                plot.axes.text(1.2e6 * impacts.LONGEST, place, name, fontsize=SIZE, color=look.color, va="center")
+        alt = f"Share of impacts solved to {tolerance:g} against time for {', '.join(_LOOKS)}."
+        panels.append(Panel(plot.svg, alt, f"error below {power_of_error(tolerance)}"))
+    return Drawn(tuple(panels), None, tuple((look.name, look) for look in _LOOKS.values()))
 
 
 _ENGINES = {method: replace(STYLES[method], filled=False) for method in motion.WORLDS if method in STYLES}
@@ -443,29 +432,25 @@ _FORMS = {FACTORED: STYLES["factored"], PRINTED: STYLES["printed, numpy"]}
 def impact_scaling(numbers: Table, fitted: Table) -> Drawn:
     """Draw the time over the number of contacts and over the number of coordinates."""
     powers = {(row["method"], row["axis"]): row for row in fitted.records()}
-    panels = tuple(
-        Panel(_growth(numbers, powers, axis), f"Time of one impact against the number of {axis}.",
-              f"{axis}, with {held[1]} {held[0]}") for axis, held in _HELD.items()
-    )  # fmt: skip
-    return Drawn(panels, numbers, tuple((look.name, look) for look in _FORMS.values()))
-
-
-def _growth(numbers: Table, powers: Mapping[tuple[str, str], Row], axis: str) -> str:
-    held = dict([_HELD[axis]])
-    with Plot(f"impact-scaling-{axis}") as plot:
-        for method, look in _FORMS.items():
-            rows = numbers.where(method=method, **held).select((axis, "time", "lower quartile", "upper quartile")).rows
-            size, middle, low, high = (np.array(part) for part in zip(*sorted(rows), strict=True))
-            plot.marks(zip(size, middle, strict=True), look)
-            plot.axes.vlines(size, low, high, color=look.color, linewidth=1.0)
-            row = powers[method, axis]
-            power = row["exponent"]
-            level = np.exp(np.mean(np.log(middle) - power * np.log(size)))
-            plot.axes.plot(size, level * size**power, color=look.color, linewidth=0.9)
-            plot.words[look.name] = (f": exponent {power:.2f}, {row['there']:.2f} from {row['steepest from']:g} to "
-                                     f"{row['to']:g}")
-        plot.log(axis, "time of one impact [µs]")
-    return plot.svg
+    panels = []
+    for axis, (other, count) in _HELD.items():
+        with Plot(f"impact-scaling-{axis}") as plot:
+            for method, look in _FORMS.items():
+                mine = numbers.where(method=method, **{other: count})
+                rows = sorted(mine.select((axis, "time", "lower quartile", "upper quartile")).rows)
+                size, middle, low, high = (np.array(part) for part in zip(*rows, strict=True))
+                plot.marks(zip(size, middle, strict=True), look)
+                plot.axes.vlines(size, low, high, color=look.color, linewidth=1.0)
+                row = powers[method, axis]
+                power = row["exponent"]
+                level = np.exp(np.mean(np.log(middle) - power * np.log(size)))
+                plot.axes.plot(size, level * size**power, color=look.color, linewidth=0.9)
+                plot.words[look.name] = (f": exponent {power:.2f}, {row['there']:.2f} from {row['steepest from']:g} to "
+                                         f"{row['to']:g}")
+            plot.log(axis, "time of one impact [µs]")
+        panels.append(Panel(plot.svg, f"Time of one impact against the number of {axis}.",
+                            f"{axis}, with {count} {other}"))
+    return Drawn(tuple(panels), numbers, tuple((look.name, look) for look in _FORMS.values()))
 
 
 @recipe(
@@ -514,32 +499,27 @@ _NOTHING = 1e-4  # [mm] where an error of zero is drawn
 )  # fmt: skip
 def effect_costs(numbers: Table) -> Drawn:
     """Draw a panel per scene."""
-    panels = tuple(_effects(scene, numbers.where(scene=scene).records())
-                   for scene in dict.fromkeys(numbers.column("scene")))  # fmt: skip
-    return Drawn(panels, numbers)
-
-
-def _effects(scene: str, rows: list[dict[str, Any]]) -> Panel:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    def places(best: bool | None = None) -> list[tuple[float, float]]:
-        return [(row["time saved"], max(row["error"], _NOTHING)) for row in rows
-                if best is None or best == (row["best of its error"] == "yes")]  # fmt: skip
-
-    with Plot(f"effect-costs-{scene}", (4.6, 3.6)) as plot:
-        plot.curve(sorted(places(True)), STYLES["IAPB"], linewidth=0.8)
-        plot.marks(places(False), OUTCOMES["cannot tell"])
-        plot.axes.set(yscale="log", xlabel="time of the step saved [%]", ylabel="error [mm]")
-        saved = [row["time saved"] for row in rows]
-        least, span = min(0.0, *saved), max(saved) - min(0.0, *saved)
-        plot.axes.set_xlim(least - 0.62 * span, least + 1.4 * span)
-        plot.axes.set_xticks([x for x in plot.axes.get_xticks() if least <= x <= least + 1.4 * span])
-        plot.axes.margins(y=0.12)
-        plot.axes.yaxis.set_major_locator(LogLocator(numticks=8))
-        plot.axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power_of_ten(y) if y > _NOTHING else "none"))
-        plot.axes.yaxis.set_minor_locator(NullLocator())
-        looks = {"yes": STYLES["IAPB"], "no": OUTCOMES["cannot tell"]}
-        colors = [looks[row["best of its error"]].color for row in rows]
-        label_marks(plot.axes, [row["effect"].replace("_", " ") for row in rows], places(), colors)
-    names = ", ".join(row["effect"] for row in rows)
-    return Panel(plot.svg, f"{scene}: error against time saved for {names}.", scene)
+    panels, looks = [], {"yes": STYLES["IAPB"], "no": OUTCOMES["cannot tell"]}
+    for scene in dict.fromkeys(numbers.column("scene")):
+        rows = [row | {"place": (row["time saved"], max(row["error"], _NOTHING))}
+                for row in numbers.where(scene=scene).records()]  # fmt: skip
+        best, others = ([row["place"] for row in rows if row["best of its error"] == kind] for kind in looks)
+        with Plot(f"effect-costs-{scene}", (4.6, 3.6)) as plot:
+            plot.curve(sorted(best), looks["yes"], linewidth=0.8)
+            plot.marks(others, looks["no"])
+            plot.axes.set(yscale="log", xlabel="time of the step saved [%]", ylabel="error [mm]")
+            saved = [row["time saved"] for row in rows]
+            least, span = min(0.0, *saved), max(saved) - min(0.0, *saved)
+            plot.axes.set_xlim(least - 0.62 * span, least + 1.4 * span)
+            plot.axes.set_xticks([x for x in plot.axes.get_xticks() if least <= x <= least + 1.4 * span])
+            plot.axes.margins(y=0.12)
+            plot.axes.yaxis.set_major_locator(LogLocator(numticks=8))
+            plot.axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power_of_ten(y) if y > _NOTHING else "none"))
+            plot.axes.yaxis.set_minor_locator(NullLocator())
+            label_marks(plot.axes, [row["effect"].replace("_", " ") for row in rows], [row["place"] for row in rows],
+                        [looks[row["best of its error"]].color for row in rows])
+        names = ", ".join(row["effect"] for row in rows)
+        panels.append(Panel(plot.svg, f"{scene}: error against time saved for {names}.", scene))
+    return Drawn(tuple(panels), numbers)
