@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.plot import Plot, plain_powers
+from reports.figures.plot import Plot
 from reports.figures.style import (
     BLUE,
     BOUND,
@@ -61,7 +61,8 @@ def agreement_map(numbers: Table, border: Table) -> Drawn:
                 distances.axes.plot(typical, shift, "X", color=VERMILION, markeredgecolor=PAPER, markeredgewidth=0.4,
                                     markersize=_SIZES.get(row["e"], 4.6))  # fmt: skip
         for plot in (shares, distances):
-            plot.lines_of(list(kinds))
+            plot.axes.set_yticks(range(len(kinds)), list(kinds))
+            plot.axes.set_ylim(len(kinds) - 0.5, -0.5)
             plot.axes.grid(False, axis="y")
         shares.axes.set(xlim=(0.0, 1.005), xlabel="share of impacts with one motion")
         distances.axes.set(xlim=(-0.03, 2.05), xlabel="distance of v⁺, of |v⁻| (ring: none differ)")
@@ -201,8 +202,7 @@ def _steps(numbers: Table) -> str:
                 axes.plot([row["least"], row["largest"]], [y, y], color=style.color, linewidth=1.2)
                 plot.marks([(row["median"], y)], replace(style, name=""), markersize=5)
             axes.plot([], [], style.marker, color=style.color, label=scene)
-        axes.set(xscale="log", xlabel="time of one step, over IAPB's compiled", ylim=(len(ways) - 0.4, -0.6))
-        plain_powers(axes)
+        plot.log("time of one step, over IAPB's compiled", "", "x", ylim=(len(ways) - 0.4, -0.6))
         axes.set_yticks(range(len(ways)), ways)
         axes.legend(loc="upper right", fontsize=8)
     return plot.svg

@@ -177,12 +177,6 @@ def penetration_over_time(run: Run) -> Floats:
     return depth
 
 
-def distance_between(run: Run, other: Run) -> Floats:
-    """Return the root mean square difference of the two device trajectories, per coordinate (d_t,)."""
-    count = min(len(run.device_q), len(other.device_q))
-    return np.sqrt(np.mean((run.device_q[:count] - other.device_q[:count]) ** 2, axis=0))
-
-
 def settling_time(run: Run) -> float | None:
     """Return the time [s] from which the device stays slower than SETTLED_SPEED; None if it moves until the end."""
     moving = np.flatnonzero(np.any(np.abs(run.device_v) > SETTLED_SPEED[: run.device_v.shape[1]], axis=1))
@@ -193,10 +187,11 @@ def settling_time(run: Run) -> float | None:
 
 def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[object, ...]:
     run = runs[curve]
-    apart: tuple[object, ...] = ()
-    if reference:
-        distance = distance_between(run, runs[reference])
-        apart = tuple(float(distance[k] * factor) for k, (_, _, factor) in enumerate(_COORDINATES))
+    apart: tuple[float, ...] = ()
+    if reference:  # root mean square over the whole run
+        other = runs[reference].device_q
+        off = (run.device_q[: len(other)] - other[: len(run.device_q)]) * [factor for _, _, factor in _COORDINATES]
+        apart = tuple(np.sqrt(np.mean(off**2, axis=0)).tolist())
     widest = np.max(np.abs(tool_positions(run) - run.device_q), axis=0)
     lengths = (float(penetration_over_time(run).max(initial=0.0)), float(np.hypot(*widest[:2])))
     return (curve, *apart, *(round(MILLI * length, _DIGITS) for length in lengths), len(run.impacts.step),
@@ -226,14 +221,10 @@ def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[list[Panel], Table
                                      **shown))
     columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
                "held τ [N m]")
-    rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(), *held_force(run).tolist())
+    rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(),
+                  *run.device_force[-max(int(_LAST_PART * run.steps), 1) :].mean(axis=0).tolist())
                  for curve, run in runs.items())  # fmt: skip
     return panels, titled(columns, rows, digits=3, note=_HELD)
-
-
-def held_force(run: Run) -> Floats:
-    """Return the mean device force over the last part of the run (d_t,)."""
-    return np.asarray(run.device_force[-max(int(_LAST_PART * run.steps), 1):].mean(axis=0))
 
 
 RECIPES = (
@@ -310,7 +301,8 @@ def _motion(run: Run) -> str:
         axes = canvas.axes
         draw_walls(axes, scene, reach=1.0)
         draw_bodies(axes, scene, run.pose[-1])
-        for k in ghost_steps(run):
+        moved = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run.q[:, :2], axis=0).T))])
+        for k in np.searchsorted(moved, np.arange(_GHOSTS) / _GHOSTS * moved[-1]):  # even along the path, not in time
             draw_bodies(axes, scene, run.pose[k], color="none", edge=MUTED, width=0.8)
         axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
         start, force = run.q[0, :2], np.asarray(scene["hand"]["force"][:2])
@@ -318,9 +310,3 @@ def _motion(run: Run) -> str:
         scale_bar(axes, (high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm", turned=True)
         note_beside(axes, start, start + _FORCE_LENGTH * force, f"hand, {np.hypot(*force):.2f} N", 9, color=FORCE)
     return canvas.svg
-
-
-def ghost_steps(run: Run) -> list[int]:
-    """Return steps that are evenly spaced along the path rather than in time."""
-    moved = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run.q[:, :2], axis=0).T))])
-    return [int(np.searchsorted(moved, share * moved[-1])) for share in np.arange(_GHOSTS) / _GHOSTS]

@@ -174,7 +174,7 @@ def impact_accuracy(numbers: Table) -> Drawn:
     for c, d in dict.fromkeys(numbers.select(("contacts", "coordinates")).rows):
         here = numbers.where(contacts=c, coordinates=d)
         with Plot(f"impact-accuracy-{c}", (4.1, 3.2)) as plot:
-            names, ends, front = [], [], []
+            front: list[tuple[float, float]] = []
             for method, look in _LOOKS.items():
                 points = []
                 for rows in impacts.by_way(here.where(method=method)).values():
@@ -192,15 +192,10 @@ def impact_accuracy(numbers: Table) -> Drawn:
                     if any(row["relative energy gain"] > impacts.NO_GAIN for row in good):
                         plot.axes.plot(time, middle, "o", markersize=9, markerfacecolor="none", markeredgecolor=FORCE)
                 front += points
-                points.sort()
-                plot.curve(points, look)
-                if points:
-                    names.append(look.name)
-                    ends.append(points[-1])
+                plot.curve(sorted(points), look)
             _draw_front(plot, front, 1e6 * impacts.LONGEST)
             plot.log("time of one impact [µs]", "relative error", xlim=(0.05, 4e5), ylim=(1e-17, 10.0))
             plot.axes.set_xticks([10.0**k for k in range(-1, 5)])
-            label_marks(plot.axes, names, ends, [STYLES[name].color for name in names])
         alt = f"Error against time with {c} contacts on {d} coordinates for {', '.join(_LOOKS)}."
         panels.append(Panel(plot.svg, alt, f"{c} contact{'s' * (c > 1)}, {d} coordinates"))
     return Drawn(tuple(panels), numbers, tuple((look.name, look) for look in _LOOKS.values()))

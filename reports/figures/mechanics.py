@@ -119,42 +119,32 @@ def socket_collisions(times: Table, counts: Table) -> Drawn:
     found = ", ".join(f"{row['filters']} {row['false collisions']}"
                       for row in counts.where(damping=_DAMPING).records())  # fmt: skip
     words = f"False collisions in two seconds at {_DAMPING:g} N s/m: {found}."
-    panels = (
-        Panel(_in_time(times, "false collisions so far", "false collisions so far"), words,
-              f"False collisions, {_DAMPING:g} N s/m"),
-        Panel(_in_time(times, "energy lost so far, share of the fall", "lost in them, share of the fall"),
-              "Energy lost in false collisions, cumulative.", "Energy that they take"),
-        Panel(_bars(counts), words, "By damping of the contact"),
-    )  # fmt: skip
-    return Drawn(panels, counts, tuple(FILTERS.items()))
-
-
-def _in_time(numbers: Table, column: str, label: str) -> str:
-    with Plot(f"socket-collisions-{numbers.keys.index(column)}") as plot:
-        axes, here = plot.axes, numbers.where(damping=_DAMPING)
-        for setting, style in FILTERS.items():
-            mine = here.where(filters=setting)
-            time, value = [0.0, *mine.column("time"), _DURATION], [0.0, *mine.column(column)]
-            look = line_arguments(style, marked=bool(mine.rows))
-            axes.step(time, [*value, value[-1]], where="post", **look | {"markevery": 4, "clip_on": False})
-        axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, _DURATION))
-        axes.set_ylim(bottom=0.0)
-        none = " and ".join(setting for setting in FILTERS if setting not in here.column("filters"))
-        note(axes, (_DURATION, 0.0), f"{none}: none" if none else "", (-2, 8), ha="right", fontsize=8.5)
-    return plot.svg
-
-
-def _bars(numbers: Table) -> str:
-    dampings = sorted(set(numbers.column("damping")))
+    panels, here = [], times.where(damping=_DAMPING)
+    none = " and ".join(setting for setting in FILTERS if setting not in here.column("filters"))
+    for column, label, alt, title in (
+        ("false collisions so far", "false collisions so far", words, f"False collisions, {_DAMPING:g} N s/m"),
+        ("energy lost so far, share of the fall", "lost in them, share of the fall",
+         "Energy lost in false collisions, cumulative.", "Energy that they take"),
+    ):  # fmt: skip
+        with Plot(f"socket-collisions-{times.keys.index(column)}") as plot:
+            for setting, style in FILTERS.items():
+                mine = here.where(filters=setting)
+                time, value = [0.0, *mine.column("time"), _DURATION], [0.0, *mine.column(column)]
+                look = line_arguments(style, marked=bool(mine.rows)) | {"markevery": 4, "clip_on": False}
+                plot.axes.step(time, [*value, value[-1]], where="post", **look)
+            plot.axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, _DURATION))
+            plot.axes.set_ylim(bottom=0.0)
+            note(plot.axes, (_DURATION, 0.0), f"{none}: none" if none else "", (-2, 8), ha="right", fontsize=8.5)
+        panels.append(Panel(plot.svg, alt, title))
+    dampings = sorted(set(counts.column("damping")))
     with Plot("socket-collisions-damping") as plot:
-        axes = plot.axes
         for number, (setting, style) in enumerate(FILTERS.items()):
-            heights = [numbers.where(filters=setting, damping=b).column("false collisions")[0] for b in dampings]
-            places = [k + 0.2 * (number - 1.5) for k in range(len(dampings))]
-            axes.bar(places, heights, width=0.17, color=style.color)
-            for place, height in zip(places, heights, strict=True):
-                note(axes, (place, height), str(height), (0, 6), fontsize=8)
-        axes.set_xticks(range(len(dampings)), [f"{b:g}" for b in dampings])
-        axes.grid(visible=False, axis="x")
-        axes.set(xlabel="damping of the contact [N s/m]", ylabel="false collisions in 2 s")
-    return plot.svg
+            for k, b in enumerate(dampings):
+                height = counts.where(filters=setting, damping=b).column("false collisions")[0]
+                plot.axes.bar(k + 0.2 * (number - 1.5), height, width=0.17, color=style.color)
+                note(plot.axes, (k + 0.2 * (number - 1.5), height), str(height), (0, 6), fontsize=8)
+        plot.axes.set_xticks(range(len(dampings)), [f"{b:g}" for b in dampings])
+        plot.axes.grid(visible=False, axis="x")
+        plot.axes.set(xlabel="damping of the contact [N s/m]", ylabel="false collisions in 2 s")
+    panels.append(Panel(plot.svg, words, "By damping of the contact"))
+    return Drawn(tuple(panels), counts, tuple(FILTERS.items()))

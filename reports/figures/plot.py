@@ -94,27 +94,11 @@ class Plot:
                        transform=self.axes.get_xaxis_transform())  # fmt: skip
 
     def log(self, x: str, y: str, scales: str = "xy", **limits: Any) -> None:
-        """Name the axes and make those in `scales` logarithmic; see `plain_powers`."""
+        """Name the axes and make those in `scales` logarithmic, with powers of ten as plain text."""
+        from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
         self.axes.set(**{f"{axis}scale": "log" for axis in scales}, xlabel=x, ylabel=y, **limits)
-        plain_powers(self.axes)
-
-    def without_lines(self) -> None:
-        """Hide the grid and the frame, for a table of marks."""
-        self.axes.grid(visible=False)
-        for side in self.axes.spines.values():
-            side.set_visible(False)
-
-    def lines_of(self, names: Sequence[str]) -> None:
-        """Make the vertical axis a list of rows, one for each name, from top to bottom."""
-        self.axes.set_yticks(range(len(names)), names)
-        self.axes.set_ylim(len(names) - 0.5, -0.5)
-
-
-def plain_powers(axes: Any) -> None:
-    """Label logarithmic axes with powers of ten as plain text, because mathematical text is not text in the SVG."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    for axis in (axis for axis in (axes.xaxis, axes.yaxis) if axis.get_scale() == "log"):
-        axis.set_major_locator(LogLocator(numticks=7))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-        axis.set_minor_locator(NullLocator())
+        for axis in (axis for axis in (self.axes.xaxis, self.axes.yaxis) if axis.get_scale() == "log"):
+            axis.set_major_locator(LogLocator(numticks=7))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+            axis.set_minor_locator(NullLocator())

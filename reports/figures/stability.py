@@ -69,15 +69,12 @@ def hardness(table: Table) -> Drawn:
     """Draw three panels over the stiffness."""
     labels = {column.key: column.title for column in table.columns}
     here = table.where(**dict(zip(_LOOP, (512.0, "ideal", 0.0), strict=True)))
-    panels = tuple(Panel(_felt(here, key, labels[key]), f"{labels[key]} against stiffness, penalties and impulses.",
-                         labels[key]) for key in _FELT)  # fmt: skip
-    return Drawn(panels, table, tuple(_LAWS.items()))
-
-
-def _felt(walls: Table, key: str, label: str) -> str:
-    with Plot(f"hardness-{_FELT.index(key) + 5}", (3.3, 2.6)) as plot:
-        for law, look in _LAWS.items():
-            rows = walls.where(law=law).select(("stiffness", key)).rows
-            plot.curve([(stiffness, value) for stiffness, value in rows if value is not None], look)
-        plot.log("stiffness [N/m]", label)
-    return plot.svg
+    panels = []
+    for number, key in enumerate(_FELT, start=5):
+        with Plot(f"hardness-{number}", (3.3, 2.6)) as plot:
+            for law, look in _LAWS.items():
+                rows = here.where(law=law).select(("stiffness", key)).rows
+                plot.curve([(stiffness, value) for stiffness, value in rows if value is not None], look)
+            plot.log("stiffness [N/m]", labels[key])
+        panels.append(Panel(plot.svg, f"{labels[key]} against stiffness, penalties and impulses.", labels[key]))
+    return Drawn(tuple(panels), table, tuple(_LAWS.items()))
