@@ -20,8 +20,8 @@ _PLACES = 40  # number of places along a curve that are tried
 _ARROW, _ASIDE = 9, 8.0  # half the length of the arrow of time, in steps, and its distance from the curve [points]
 _STEP = 2.0  # points between the places of a line that a name must not cover
 # directions and distances [points] of a name from its place
-_AROUND = tuple((np.array(way), away) for away in (3.0, 10.0, 20.0, 32.0, 48.0, 70.0)
-                for way in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)))  # fmt: skip
+_AWAY = np.repeat([3.0, 10.0, 20.0, 32.0, 48.0, 70.0], 8)
+_WAYS = np.tile([(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)], (6, 1))
 
 Box = tuple[float, float, float, float]  # left, bottom, right, top
 Points = NDArray[np.float64]
@@ -167,24 +167,34 @@ class _Sheet:
 
         others : points of other curves; where a start is near them, the name could belong to either
         """
-        left, bottom, right, top = self.frame
+        low, high = np.split(np.array(self.frame), 2)
         extent = np.array([_width(name, size) + 2.0, size + 2.0])
-        drawn = np.vstack([self.rest, *self.curves.values()])
-        best: tuple[float, Box, Points] = (np.inf, (0.0, 0.0, 0.0, 0.0), starts[0])
-        for at in starts:
-            apart = np.inf if others is None or not len(others) else float(np.min(np.hypot(*(others - at).T)))
-            for way, away in _AROUND:
-                low = at + way * (away + gap + 0.5 * extent) - 0.5 * extent
-                box = (float(low[0]), float(low[1]), float(low[0] + extent[0]), float(low[1] + extent[1]))
-                cost = (2.0 * _covered(box, drawn) + away / 4.0 + 30.0 * max(0.0, 1.0 - apart / _NEAR)
-                        + 400.0 * sum(_overlap(box, other) for other in self.taken)
-                        + 1e6 * (box[0] < left or box[1] < bottom or box[2] > right or box[3] > top))
-                if cost < best[0]:
-                    leader = _leader(at, box)
-                    cost += 40.0 * any(_covered(other, leader) for other in self.taken)
-                if cost < best[0]:
-                    best = (cost, box, at)
-        return best[1:]
+        centers = starts[:, None] + _WAYS * (_AWAY[:, None] + gap + 0.5 * extent)
+        corners = (centers - 0.5 * extent).reshape(-1, 2)
+        boxes, taken = np.hstack([corners, corners + extent]), np.array(self.taken).reshape(-1, 4)
+        apart = np.full(len(starts), np.inf)
+        if others is not None and len(others):
+            apart = np.array([np.hypot(*(others - at).T).min() for at in starts])
+        # how many points of lines there are to the left of and below each point of the drawing, 1 point apart
+        drawn = np.clip(np.vstack([self.rest, *self.curves.values()]) - low, 0.0, high - low).astype(int)
+        below = np.zeros(np.ceil(high - low).astype(int) + 2)
+        np.add.at(below, tuple(drawn.T + 1), 1.0)
+        below = below.cumsum(axis=0).cumsum(axis=1)
+        left, bottom, right, top = np.clip((boxes - np.tile(low, 2)).round(), 0, np.tile(high - low, 2)).astype(int).T
+        covered = below[right, top] - below[left, top] - below[right, bottom] + below[left, bottom]
+        overlaps = ((boxes[:, None, :2] < taken[:, 2:]) & (taken[:, :2] < boxes[:, None, 2:])).all(axis=2).sum(axis=1)
+        outside = (boxes < np.tile(low, 2)).any(axis=1) | (boxes > np.tile(high, 2)).any(axis=1)
+        costs = (2.0 * covered + np.tile(_AWAY, len(starts)) / 4.0 + 400.0 * overlaps + 1e6 * outside
+                 + np.repeat(30.0 * np.maximum(0.0, 1.0 - apart / _NEAR), len(_AWAY)))  # fmt: skip
+        best = (np.inf, 0)
+        for k in np.argsort(costs, kind="stable"):
+            if costs[k] >= best[0]:
+                break
+            leader = _leader(starts[k // len(_AWAY)], boxes[k])[:, None]
+            crosses = ((leader > taken[:, :2]) & (leader < taken[:, 2:])).all(axis=2).any()
+            best = min(best, (float(costs[k]) + 40.0 * bool(crosses), int(k)))
+        x, y, end, height = boxes[best[1]].tolist()
+        return (x, y, end, height), starts[best[1] // len(_AWAY)]
 
     def write(self, name: str, at: Points, box: Box, size: float, color: str, gid: str | None = None, *,
               leader: bool = True, listed: bool = False) -> None:  # fmt: skip
@@ -212,11 +222,7 @@ def _width(text: str, size: float) -> float:
     return float(TextPath((0.0, 0.0), text, size=size).get_extents().width)
 
 
-def _covered(box: Box, points: Points) -> float:
-    return float(np.sum(((points > box[:2]) & (points < box[2:])).all(axis=1)))
-
-
-def _leader(mark: Points, box: Box) -> Points:
+def _leader(mark: Points, box: Any) -> Points:
     """Return points along the line from a mark to its name, without those at the mark; none if the name is near."""
     if np.hypot(*(np.clip(mark, box[:2], box[2:]) - mark)) <= _NEAR + 2.0:
         return np.zeros((0, 2))
@@ -224,7 +230,3 @@ def _leader(mark: Points, box: Box) -> Points:
     length = float(np.hypot(*way))
     points = np.asarray(mark + np.arange(_NEAR, length, 0.5 * _STEP)[:, None] / length * way)
     return points[((points < box[:2]) | (points > box[2:])).any(axis=1)]
-
-
-def _overlap(a: Box, b: Box) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
