@@ -228,8 +228,16 @@ def performance_profile(numbers: Table) -> Drawn:
             here = own.where(collection=collection)
             last = {row["solver"]: row["share solved"] for row in here.records()}
             words = ", ".join(f"{solver} {share:.0%}" for solver, share in last.items())
-            panels.append(Panel(_profile(here, looks, f"{collection}-{kind}"), f"Shares solved at all: {words}.",
-                                f"{collection}, {kind}"))  # fmt: skip
+            with Plot(f"performance-profile-{collection.replace(' ', '-')}-{kind}", (4.4, 3.2)) as plot:
+                for number, (solver, look) in enumerate(looks.items()):
+                    curve = here.where(solver=solver).select(("factor", "share solved")).rows
+                    if curve:
+                        how = line_arguments(look) | {"markevery": (number % 5, 9)}
+                        plot.axes.step(*zip(*curve, strict=True), where="post", **how)
+                plot.log("factor of the fastest solver's time", "share of problems solved", "x")
+                plot.axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0", "0.25", "0.5", "0.75", "1"])
+                plot.axes.set_ylim(-0.02, 1.03)
+            panels.append(Panel(plot.svg, f"Shares solved at all: {words}.", f"{collection}, {kind}"))
     curves: dict[tuple[str, ...], list[float]] = {}
     for *name, share in numbers.select(("collection", "kind", "solver", "share solved")).rows:
         curves.setdefault(tuple(name), []).append(share)
@@ -237,20 +245,6 @@ def performance_profile(numbers: Table) -> Drawn:
     rows = tuple((*name, shares[0], shares[-1]) for name, shares in curves.items())
     return Drawn(tuple(panels), titled(("collection", "kind", "solver", *ends), rows, 3, timed=ends),
                  tuple(legend.items()))  # fmt: skip
-
-
-def _profile(numbers: Table, looks: Mapping[str, LineStyle], key: str) -> str:
-    with Plot(f"performance-profile-{key.replace(' ', '-')}", (4.4, 3.2)) as plot:
-        axes = plot.axes
-        for number, (solver, look) in enumerate(looks.items()):
-            curve = numbers.where(solver=solver).select(("factor", "share solved")).rows
-            if curve:
-                how = line_arguments(look) | {"markevery": (number % 5, 9)}
-                axes.step(*zip(*curve, strict=True), where="post", **how)
-        plot.log("factor of the fastest solver's time", "share of problems solved", "x")
-        axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0", "0.25", "0.5", "0.75", "1"])
-        axes.set_ylim(-0.02, 1.03)
-    return plot.svg
 
 
 _ROUNDING = 1e-12  # smaller errors count as none
@@ -270,24 +264,21 @@ def rigid_convergence(numbers: Table) -> Drawn:
     errors = {row["scene"]: max(row[column] for column in _ERRORS.values()) for row in numbers.records()}
     shown = sorted(errors, key=errors.__getitem__)[-_SCENES:]
     looks = looks_of(scene for scene, error in errors.items() if scene in shown and error > _ROUNDING)
-    panels = tuple(Panel(_errors(numbers, looks, column), f"Errors of {label} against the step.", label)
-                   for label, column in _ERRORS.items())  # fmt: skip
-    return Drawn(panels, numbers, (*looks.items(), ("first order", BOUND)))
-
-
-def _errors(numbers: Table, looks: Mapping[str, LineStyle], column: str) -> str:
-    with Plot(f"rigid-convergence-{column.split()[-1]}", (4.4, 3.4)) as plot:
-        drawn: list[tuple[float, float]] = []
-        for scene, look in looks.items():
-            rows = numbers.where(scene=scene).select(("step", column)).rows
-            curve = sorted((step, error) for step, error in rows if error > _ROUNDING)
-            plot.curve(curve, look)
-            drawn += curve
-        if drawn:  # a line of slope one below all curves
-            lowest = min(error / step for step, error in drawn)
-            ends = (min(step for step, _ in drawn), max(step for step, _ in drawn))
-            plot.curve([(step, 0.5 * lowest * step) for step in ends], BOUND, marked=False)
-        plot.log("step [ms]", "error")
-        steps = sorted(set(numbers.column("step")))
-        plot.axes.set_xticks(steps, [f"{step:.2g}" for step in steps])
-    return plot.svg
+    panels = []
+    for column, label in _ERRORS.items():
+        with Plot(f"rigid-convergence-{column.split()[-1]}", (4.4, 3.4)) as plot:
+            drawn: list[tuple[float, float]] = []
+            for scene, look in looks.items():
+                rows = numbers.where(scene=scene).select(("step", column)).rows
+                curve = sorted((step, error) for step, error in rows if error > _ROUNDING)
+                plot.curve(curve, look)
+                drawn += curve
+            if drawn:  # a line of slope one below all curves
+                lowest = min(error / step for step, error in drawn)
+                ends = (min(step for step, _ in drawn), max(step for step, _ in drawn))
+                plot.curve([(step, 0.5 * lowest * step) for step in ends], BOUND, marked=False)
+            plot.log("step [ms]", "error")
+            steps = sorted(set(numbers.column("step")))
+            plot.axes.set_xticks(steps, [f"{step:.2g}" for step in steps])
+        panels.append(Panel(plot.svg, f"Errors of {label} against the step.", label))
+    return Drawn(tuple(panels), numbers, (*looks.items(), ("first order", BOUND)))
