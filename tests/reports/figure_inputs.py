@@ -74,7 +74,7 @@ def tables() -> dict[str, Table]:
                 for k, (engine, law) in enumerate((("iapb (ours)", "met"), ("MuJoCo", "missed"), ("Drake", "failed"),
                                                    ("Siconos", "not installed")))
                 for m, scene in enumerate(_SCENES) for settings in ("own", "matched")
-                for value in [10.0 ** (3 * k - 16 + m) if k < 2 else None])),
+                for value in [10.0 ** (3 * k - 16 + 2 * m) if k < 2 else None])),
         "haptic-rate/budgets": (
             "contacts; rank; budget [rows]; median residual; share of the loss; largest relative gain", (
             (6 * n, n, k, 0.5 * (1 - k / n), k / n, -0.1) for n in (4, 8, 20) for k in range(n + 1))),

@@ -26,6 +26,7 @@ from reports.figures.corner import penetration_over_time
 from reports.figures.figure import Figure, NotComputed, Recipe, draw
 from reports.figures.labels import name_curves
 from reports.figures.numbers import format_cell, format_number
+from reports.figures.standalone import standalone
 from reports.figures.style import CYCLE, LOOKS, STYLES, VARIABLES, LineStyle
 from reports.figures.svg import to_svg
 from reports.figures.two_link_arm import arm_energies
@@ -253,6 +254,19 @@ def test_every_colour_of_a_drawing_follows_the_page(figure: Figure) -> None:
     for panel in figure.panels:
         used = set(re.findall(r"(?:fill|stroke): ([^;\"]+)", panel.svg))
         assert {color for color in used if not color.startswith("url(#")} <= known | {"none"}  # url: a hatch, drawn so
+
+
+def test_a_table_is_html_in_the_page_and_in_its_own_file(gallery: Gallery) -> None:
+    tables = {figure.key: [panel for panel in figure.panels if panel.is_table] for figure in gallery.drawn}
+    assert {key: len(found) for key, found in tables.items() if found} == {
+        "which-method": 1, "trajectory-precision": 1, "integrator-precision": 1, "engine-errors": 3}  # fmt: skip
+    energy = ElementTree.fromstring(tables["engine-errors"][0].svg)
+    assert {len(row) for row in energy.iter("tr")} == {7} and len(list(energy.iter("tr"))) == 9
+    marks = {"".join(cell.itertext()): cell.get("style") for cell in energy.iter("td")}
+    assert marks["−14"] == "background: color-mix(in srgb, var(--blue, #0072b2) 75%, transparent)"
+    assert marks["✕"] == "color: var(--vermilion, #d55e00)"
+    whole = standalone(next(figure for figure in gallery.drawn if figure.key == "engine-errors"))
+    assert whole.startswith("<!DOCTYPE html>") and all(panel.svg in whole for panel in tables["engine-errors"])
 
 
 def test_rows_of_a_table_have_as_many_cells_as_there_are_columns(figure: Figure) -> None:
