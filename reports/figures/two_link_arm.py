@@ -20,44 +20,27 @@ from reports.figures.plot import Plot
 from reports.figures.style import BLUE, BOUND, INK, LINK, MUTED, PAPER, PEG, STYLES, VERMILION, line_arguments
 from verification.finding import titled
 
-LENGTH, MASS = 1.0, 1.0  # of both links [m], [kg]
+LENGTH = 1.0  # of both links [m]
 CONTACTS = {"A": 0.7, "B": 0.5}  # distance along the second link [m]
 VELOCITY = np.array([1.0, 1.0])  # [rad/s]
-READINGS = ("uniform rods", "point masses")
+# M of the straight arm [kg m²], its links of 1 m and 1 kg: slender uniform rods, or all mass at the far ends
+READINGS = {"uniform rods": np.array([[8 / 3, 5 / 6], [5 / 6, 1 / 3]]),
+            "point masses": np.array([[5.0, 2.0], [2.0, 1.0]])}  # fmt: skip
 RESTITUTIONS = np.linspace(0.0, 1.0, 41)
 
 Floats = NDArray[np.float64]
 
 
-def mass_matrix(reading: str) -> Floats:
-    """Return M of the straight arm (q2 = 0) [kg m²], for slender uniform rods or for all mass at the far ends."""
-    centre, inertia = (LENGTH / 2, MASS * LENGTH**2 / 12) if reading == "uniform rods" else (LENGTH, 0.0)
-    about_joint = MASS * centre**2 + inertia
-    coupling = MASS * LENGTH * centre
-    first = about_joint + (about_joint + MASS * LENGTH**2 + 2 * coupling)  # its own link, and the other carried along
-    return np.array([[first, about_joint + coupling], [about_joint + coupling, about_joint]])
-
-
-def contact_row(distance: float) -> Floats:
-    """Return nᵀJ at `distance` along the second link; n is opposite to the motion of the straight arm."""
-    return -np.array([[LENGTH + distance, distance]])
-
-
-def energy_after(reading: str, distance: float, restitution: float) -> float:
-    """Return KE after the collision [J]."""
-    mass = mass_matrix(reading)
-    impact = resolve_impact(mass, contact_row(distance), VELOCITY, restitution)
-    return float(0.5 * VELOCITY @ mass @ VELOCITY + impact.energy_change)
-
-
 def arm_energies() -> dict[str, Floats]:
     """Return the data of the figure: ``restitution``, and KE and KE₀ [J] by mass distribution and contact point."""
     table: dict[str, Floats] = {"restitution": RESTITUTIONS}
-    for reading in READINGS:
-        mass = mass_matrix(reading)
-        table[f"{reading}, KE0"] = np.full(len(RESTITUTIONS), 0.5 * VELOCITY @ mass @ VELOCITY)
+    for reading, mass in READINGS.items():
+        before = 0.5 * VELOCITY @ mass @ VELOCITY
+        table[f"{reading}, KE0"] = np.full(len(RESTITUTIONS), before)
         for name, distance in CONTACTS.items():
-            table[f"{reading}, {name}"] = np.array([energy_after(reading, distance, e) for e in RESTITUTIONS])
+            row = -np.array([[LENGTH + distance, distance]])  # opposite to the motion
+            table[f"{reading}, {name}"] = np.array([before + resolve_impact(mass, row, VELOCITY, e).energy_change
+                                                    for e in RESTITUTIONS])  # fmt: skip
     return table
 
 
