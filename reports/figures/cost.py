@@ -335,7 +335,7 @@ def _worth_said(row: Row, looks: Mapping[str, LineStyle]) -> tuple[str, tuple[st
 
 
 def _motions(key: str, here: Sequence[motion.Curve], lost: Table, looks: Mapping[str, LineStyle]) -> str:
-    def places(runs: Iterable[Row]) -> list[tuple[float, float]]:
+    def places(runs: Iterable[dict[str, Any]]) -> list[tuple[float, float]]:
         return [(run["time"], run["position"]) for run in runs if not motion.by_chance(run)]
 
     floor = 0.2 * min(curve.least for curve in here)

@@ -156,9 +156,9 @@ class _Sheet:
 
         values = np.column_stack(STEP_LOOKUP_MAP[line.get_drawstyle()](*np.asarray(line.get_xydata(), dtype=float).T))
         paper = self.scale * line.get_transform().transform(values)
-        if line.get_linestyle() != "None":
+        if line.get_linestyle() != "None" and len(paper) > 1:
             return self.along(paper)
-        corners = _MARK * np.array([(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)])
+        corners = (0.5 * line.get_markersize() + 1.0) * np.array([(0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)])
         return self._inside((paper[:, None, :] + corners).reshape(-1, 2))
 
     def least(self, starts: Points, name: str, size: float, others: Points | None = None,

@@ -28,7 +28,7 @@ def contact_forces(run: Run) -> Drawn:
     """Draw the hardest collision and the last resting instant of the run."""
     instants = (("(a) colliding: impulses", hardest_collision(run), run.contacts.impulse, "N s"),
                 ("(b) resting: forces", last_contact(run), run.contacts.normal_force, "N"))
-    panels, rows, scene = [], list[tuple[object, ...]](), run.scene_resolved
+    panels, rows, scene = list[Panel](), list[tuple[object, ...]](), run.scene_resolved
     for title, step, values, unit in instants:
         if step is None:
             continue
