@@ -190,8 +190,8 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
     apart: tuple[float, ...] = ()
     if reference:  # root mean square over the whole run
         other = runs[reference].device_q
-        off = (run.device_q[: len(other)] - other[: len(run.device_q)]) * [factor for _, _, factor in _COORDINATES]
-        apart = tuple(np.sqrt(np.mean(off**2, axis=0)).tolist())
+        off = np.sqrt(np.mean((run.device_q[: len(other)] - other[: len(run.device_q)]) ** 2, axis=0))
+        apart = tuple(float(off[k] * factor) for k, (_, _, factor) in enumerate(_COORDINATES))
     widest = np.max(np.abs(tool_positions(run) - run.device_q), axis=0)
     lengths = (float(penetration_over_time(run).max(initial=0.0)), float(np.hypot(*widest[:2])))
     return (curve, *apart, *(round(MILLI * length, _DIGITS) for length in lengths), len(run.impacts.step),
