@@ -19,7 +19,7 @@ from reports.figures.canvas import is_turned, widened
 from reports.figures.corner import UNLIMITED
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
 from reports.figures.geometry import Floats, body_outlines, half_plane, outline
-from reports.figures.style import BLUE, FORCE, INK, PEG, VARIABLES, WALL
+from reports.figures.style import BLUE, FORCE, INK, PEG, WALL, css
 from verification.finding import titled
 
 SIZE = (400, 300)
@@ -133,14 +133,14 @@ class Film:
         scene = self.run.scene_resolved
         reach = _REACH * float(max(np.ptp(np.vstack([corners for _, corners in body_outlines(scene)]), axis=0)))
         rings = [half_plane(wall, reach) if wall["kind"] == "half_plane" else outline(wall) for wall in scene["walls"]]
-        return f'<path {_paint("fill", WALL)} d="{"".join(_ring(self.flat(ring)) for ring in rings)}"/>'
+        return f'<path fill="{css(WALL)}" d="{"".join(_ring(self.flat(ring)) for ring in rings)}"/>'
 
     def bodies(self) -> Iterator[str]:
         """Yield the bodies; a circle has a spoke that shows how it turns."""
         steps = moments(self.run, _MOMENTS)
         times = self._times(steps)
         own = self.scale * _sign(self.run) * np.array([1.0, -1.0])
-        look = f'{_paint("fill", PEG)} {_paint("stroke", INK)} stroke-width="1.6" fill-opacity="0.8"'
+        look = f'fill="{css(PEG)}" stroke="{css(INK)}" stroke-width="1.6" fill-opacity="0.8"'
         for k, body in enumerate(self.run.scene_resolved["bodies"]):
             rings = [own * outline(shape) for shape in body["shapes"]]
             spokes = [own * np.array([ring_center(shape), ring_center(shape) + [shape["radius"], 0.0]])
@@ -170,7 +170,7 @@ class Film:
             span = self.run.time[step] / self.end, self.run.time[steps[k + 1]] / self.end
             for strengths, part, color in ((contacts.normal_force, now, BLUE), (contacts.impulse, since, FORCE)):
                 if drawn := "".join(self._mark(strengths, part, cross=color == FORCE)):
-                    yield (f'<path fill="none" {_paint("stroke", color)} stroke-width="2" d="{drawn}">'
+                    yield (f'<path fill="none" stroke="{css(color)}" stroke-width="2" d="{drawn}">'
                            f'<animate attributeName="display" values="none;inline;none" calcMode="discrete" '
                            f'keyTimes="0;{max(span[0], 1e-4):.4f};{span[1]:.4f}" dur="{self.slower * self.end:g}s" '
                            'repeatCount="indefinite"/></path>')
@@ -194,10 +194,6 @@ class Film:
 def ring_center(shape: Mapping[str, Any]) -> Floats:
     """Return the center (2,) [m] of a shape in the frame of its body."""
     return np.asarray(shape["center"], dtype=float)[:2]
-
-
-def _paint(what: str, color: str) -> str:
-    return f'{what}="var(--{VARIABLES[color]}, {color})"'
 
 
 def _ring(points: Floats) -> str:
