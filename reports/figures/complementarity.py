@@ -265,7 +265,7 @@ def rigid_convergence(numbers: Table) -> Drawn:
     shown = sorted(errors, key=errors.__getitem__)[-_SCENES:]
     looks = looks_of(scene for scene, error in errors.items() if scene in shown and error > _ROUNDING)
     panels = []
-    for column, label in _ERRORS.items():
+    for label, column in _ERRORS.items():
         with Plot(f"rigid-convergence-{column.split()[-1]}", (4.4, 3.4)) as plot:
             drawn: list[tuple[float, float]] = []
             for scene, look in looks.items():
