@@ -30,7 +30,7 @@ from verification.finding import (
     verdict_of_law,
 )
 from verification.region import Region
-from verification.table import HOLDS, Row, Table, by_part, column_of, ranges
+from verification.table import HOLDS, Row, Table, by_part, ranges, table_from
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
@@ -68,6 +68,10 @@ class Study:
         if key not in self.results:
             self.results[key] = compute()
         return cast(Result, self.results[key])
+
+    def table(self, check: Check) -> Table:
+        """Return the table of a check, which is made only once; another check may show what follows from it."""
+        return self.once(("table", check.key), lambda: check.table(self))
 
     def scene(self, name: str) -> Scene:
         """Return a scene of the project by name."""
@@ -140,12 +144,8 @@ class Check:
     def table_of(self, rows: Iterable[Row]) -> Table:
         """Return the judged table of these rows; a row without a value has None in its place."""
         given = list(rows)
-        titles = [title for title in dict.fromkeys(title for row in given for title in row) if title != HOLDS]
-        marks = {"condition": self.conditions, "part": self.parts, "cases": self.counts, "timed": self.timed,
-                 "prose": self.prose}  # fmt: skip
-        table = Table(tuple(column_of(title, **marks) for title in titles),
-                      tuple(tuple(row.get(title) for title in titles) for row in given),
-                      digits=self.digits, note=self.note, timed_rows=self.timed_rows)  # fmt: skip
+        table = table_from(given, self.digits, self.note, self.timed_rows, condition=self.conditions, part=self.parts,
+                           cases=self.counts, timed=self.timed, prose=self.prose)
         if self.holds is not None:
             return table.judged(self.holds)
         known = any(HOLDS in row for row in given)
@@ -214,18 +214,29 @@ class Topic:
         """Run every check and return the finding. A check that raises leaves no table; the finding names it."""
         study, total = Study(run, depth), len(self.checks)
         tables: dict[str, Table] = {}
-        parts: list[Part] = []
         failures: list[Failure] = []
         for done, check in enumerate(self.checks):
             progress(done, total)
             study.failures = []
-            table = attempt("all of it", partial(check.table, study), study.failures)
+            table = attempt("all of it", partial(study.table, check), study.failures)
             if table is not None:
                 tables[check.key] = table
-                parts += attempt("its sentence", partial(check.sentences, table), study.failures) or ()
             failures += [replace(one, case=f"{check.key}, {one.case}") for one in study.failures]
         progress(total, total)
-        said = attempt("the answer", partial(self.says, tables, parts), failures) or ""
-        answer = said if isinstance(said, Part) else Part(said, "")
-        return finding_of(self.key, self.title, self.question, answer.sentence, parts, tables, failures,
-                          answer.quantities)
+        return self.conclude(tables, failures)
+
+    def conclude(
+        self, tables: Mapping[str, Table], failures: Sequence[Failure] = (), given: Iterable[Part] = ()
+    ) -> Finding:
+        """Return the finding of tables by key of the check, with `given` parts after those of the checks."""
+        lost, parts = list[Failure](), list[Part]()
+        for check in self.checks:
+            if check.key in tables:
+                said = partial(check.sentences, tables[check.key])
+                parts += attempt(f"{check.key}, its sentence", said, lost) or ()
+        parts += given
+        told = attempt("the answer", partial(self.says, tables, parts), lost) or ""
+        answer = told if isinstance(told, Part) else Part(told, "")
+        known = {one.case for one in failures}
+        return finding_of(self.key, self.title, self.question, answer.sentence, parts, tables,
+                          [*failures, *(one for one in lost if one.case not in known)], answer.quantities)

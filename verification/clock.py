@@ -16,8 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.finding import Failure, attempt
-from verification.table import Column
+from verification.finding import MIXED, REPRODUCED, Failure, Part, Quantities, attempt
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
@@ -73,16 +72,20 @@ class Times:
         return Times(tuple(ours / theirs for ours, theirs in zip(self.samples, other.samples, strict=True)))
 
 
-TIME_COLUMNS = (
-    Column("time", "µs", timed=True),
-    Column("lower quartile", "µs", timed=True),
-    Column("upper quartile", "µs", timed=True),
-)
+TIMES = ("time", "lower quartile", "upper quartile")  # the columns of `time_cells`
 
 
 def time_cells(times: Times) -> dict[str, float]:
-    """Return the cells of TIME_COLUMNS."""
-    return {"time": 1e6 * times.median, "lower quartile": 1e6 * times.lower, "upper quartile": 1e6 * times.upper}
+    """Return the median and the quartiles in microseconds."""
+    values = (times.median, times.lower, times.upper)
+    return {f"{name} [µs]": 1e6 * value for name, value in zip(TIMES, values, strict=True)}
+
+
+def target(
+    sentence: str, met: bool, miss: str = "", *, timed: bool = True, quantities: Quantities = ()
+) -> Part:
+    """Return a part on a target; `miss` is the text for the first page if the target is missed."""
+    return Part(sentence, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss, quantities=quantities)
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:

@@ -158,6 +158,19 @@ def titled(
     return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, timed_rows)
 
 
+def table_from(
+    rows: Iterable[Row], digits: int = 4, note: str = "", timed_rows: bool = False, **marks: Collection[str]
+) -> Table:
+    """Return a table of dictionaries whose keys carry the unit; they are the columns, in the order of appearance.
+
+    A row without a value has None in its place. `marks` are those of `column_of`.
+    """
+    given = list(rows)
+    titles = [title for title in dict.fromkeys(title for row in given for title in row) if title != HOLDS]
+    return Table(tuple(column_of(title, **marks) for title in titles),
+                 tuple(tuple(row.get(title) for title in titles) for row in given), (), digits, note, timed_rows)
+
+
 def column_of(title: str, **marks: Collection[str]) -> Column:
     """Return the column of a title such as "step [ms]". Each mark (`condition`, `part`, `timed` ...) lists the titles
     or keys of the columns that have it."""

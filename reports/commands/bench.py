@@ -15,8 +15,8 @@ from reports.commands.lines import sentence
 from reports.commands.progress import stage_progress
 from reports.provenance import processor
 from verification.cost.impacts import choices, short_time, which_method, work_precision
-from verification.cost.study import haptic_study
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
+from verification.haptic_rate import haptic_study
 
 LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
 
@@ -34,7 +34,7 @@ def bench(
     if budget:
         return _recommended(seconds_of(budget), contacts, coordinates)
     with stage_progress() as progress:
-        topic = haptic_study("full" if full else "quick", progress)
+        topic = haptic_study("full" if full else "quick", lambda done, total: progress("tables", done, total))
         methods = work_precision(progress=lambda done, total: progress("methods on problems", done, total))
     facts = {"processor": processor(), "verdict": topic.verdict, "parts": topic.parts, "failures": topic.failures,
              "tables": {name: table.records() for name, table in topic.tables.items()} | {

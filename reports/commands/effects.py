@@ -53,7 +53,8 @@ def _measured(source: Any, world: str) -> Answer:
     if world not in ("IAPB", "PB"):
         raise ArgumentError("world", world, "IAPB or PB: --measure needs a world of the compiled engine")
     with stage_progress() as progress:
-        found = effects_of(source, world, lambda done, total: progress("with and without each effect", done, total))
+        progress("with and without each effect", 0, 1)
+        found = effects_of(source, world)
     best = {row["effect"]: row["best of its error"] for row in summary({source.name: found}).records()}
     rows = [(one["effect"], "on" if one["active"] else "off", one["reason"], one["cost"],
              (one["change"] or one["left out"]) if one["active"] else None, best.get(one["effect"]))

@@ -18,8 +18,8 @@ from reports.figures.two_link_arm import arm_energies
 from reports.pages.records import Evidence, FailedCases
 from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
+from verification import haptic_rate
 from verification.cost import effects
-from verification.cost import study as cost
 from verification.cost.impacts import work_precision
 from verification.finding import Failure, Finding, Table, attempt
 from verification.hard_cases import study as hard_cases
@@ -59,7 +59,8 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     gains, properties, *others = (_topic(kept, name, runner, depth) for name in TOPICS)
     topics = (gains, kept.finding("proofs", proved, partial(on_proofs, development=in_coq)), properties,
               kept.finding("hard cases", hard, hard_cases.on_hard_cases), *others)  # fmt: skip
-    topics = tuple(cost.quoting(topic, (*ledger, *topics)) if topic.key == cost.KEY else topic for topic in topics)
+    topics = tuple(haptic_rate.quoting(topic, (*ledger, *topics)) if topic.key == haptic_rate.TOPIC.key else topic
+                   for topic in topics)
     if kept.failures["claims"] and not ledger:
         topics = (failed_topic("claims", kept.failures["claims"][0]), *topics)
     inputs["work_precision"] = timed

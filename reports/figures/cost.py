@@ -31,7 +31,7 @@ from verification.cost import impacts
 from verification.cost import trajectories as motion
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
-from verification.cost.step_cost import IDEAL
+from verification.cost.steps import IDEAL
 from verification.finding import Table
 
 Row = Mapping[str, Any]

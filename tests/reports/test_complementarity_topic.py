@@ -21,8 +21,11 @@ from verification.complementarity.agreement import MAP, TWO_CONTACTS
 from verification.complementarity.convergence import CONVERGENCE
 from verification.complementarity.families import FAMILIES
 from verification.complementarity.solvers import OWN, collections
-from verification.cost.step_cost import COST_COLUMNS, LEMKE_KERNEL, STEP_COLUMNS, WAYS, impact_cost
-from verification.finding import Table, table_of
+from verification.cost import solvers as timings
+from verification.cost.solvers import FAMILIES as TIMED
+from verification.cost.solvers import IMPACT_TIMES, LEMKE_KERNEL, Size
+from verification.cost.steps import STEP_TIMES, WAYS
+from verification.finding import Table
 
 KEY = topic.TOPIC.key
 
@@ -36,18 +39,21 @@ def study() -> dict[str, Table]:
     patch.setattr(solvers, "own_problems", lambda failures: problems)
     given = Study()
     own, profile = collections({OWN: None})
-    pile, spread = {"impacts": "pile", "contacts": 2}, {"median": 200.0, "least": 100.0, "largest": 300.0}
+    pile, spread = {"impacts": "pile", "contacts": 2}, dict(zip(timings.MEASURED, (200.0, 100.0, 300.0), strict=True))
     unsolved = ({**pile, "solver": "slow", "outcome": "left out", "note": "left out: 9 s for fewer contacts"},
                 {**pile, "solver": "wrong", "outcome": "failed", **spread, "distance": 0.1})
     still = dict.fromkeys(("events", "error of positions", "error of velocities"), 0.0)
     orders = {"order, positions": 1.0, "order, velocities": None}
+    patch.setattr(timings, "SOLVERS", ("daqp",))
+    timed = IMPACT_TIMES.table(given, [Size(family, contacts) for contacts in (1, 2) for family in TIMED])
     found = {
         "map": MAP.table(given, FAMILIES), "two contacts": TWO_CONTACTS.table(given), "own problems": own.table(given),
         "profile": profile.table(given),
         "convergence": CONVERGENCE.table_of([{"scene": "still", "step [ms]": step, **still, **orders, "holds": None}
                                              for step in (2.0, 0.5)]),
-        "time per impact": table_of(COST_COLUMNS, [*impact_cost((1, 2), ("daqp",), 1).records(), *unsolved]),
-        "time per step": table_of(STEP_COLUMNS, [{"scene": "peg_corner", "world": way, **spread} for way in WAYS]),
+        "time per impact": IMPACT_TIMES.table_of([*timed.by_title(), *unsolved]),
+        "time per step": STEP_TIMES.table_of([{"scene": "peg_corner", "world": way, "median": 200.0, "least": 100.0,
+                                               "largest": 300.0} for way in WAYS]),
     }  # fmt: skip
     patch.undo()
     return found

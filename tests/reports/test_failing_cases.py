@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +13,9 @@ import pytest
 from iapb import find_scene
 from reports.runner import Runner
 from verification import check, engines
-from verification.cost import (
-    against_mujoco,
-    growth,
-    impacts,
-    many_bodies,
-    resting_scenes,
-    start_up,
-    step_cost,
-    study,
-    trajectories,
-)
+from verification.cost import growth, trajectories
 from verification.finding import Finding
+from verification.haptic_rate import BENCH, RATE
 from verification.scenes import ledger
 from verification.stability import device_port, peg, walls
 from verification.stability.topic import contact_stability
@@ -97,58 +89,25 @@ def test_scenes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert len(topic.parts) == 7
 
 
-def test_haptic_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenes_at_rest = resting_scenes.resting_scenes()
-    monkeypatch.setattr(against_mujoco, "_mujoco", lambda: None)
-    monkeypatch.setattr(against_mujoco, "_race", broken(_races, lambda scene, *_: scene is scenes_at_rest[1]))
-    for module in (against_mujoco, study):
-        monkeypatch.setattr(module, "resting_scenes", lambda: scenes_at_rest)
-    monkeypatch.setattr(study, "profile_step", broken(lambda *_, rounds: [], lambda scene: scene is scenes_at_rest[0]))
-    monkeypatch.setattr(study, "SOLVER_CONTACTS", {"quick": (1, 2)})
-    monkeypatch.setattr(step_cost, "_time_case", broken(_solver_rows, lambda case, *_: case.contacts == 2))
+def test_haptic_rate(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     clock = itertools.count(1)
-    monkeypatch.setattr(growth, "_sampler", broken(lambda *_: lambda: 1e-6 * next(clock),
-                                                   lambda method, d, c: (d, c) == (24, 60)))
-    monkeypatch.setattr(growth, "_trial", broken(lambda *_: (0, 1e-6), lambda method, d, c, calls: (method, d, c) == (
-        growth.PRINTED, 3, 60)))  # fmt: skip
-    monkeypatch.setattr(many_bodies, "_cost", broken(_step_of, (50).__eq__))
-    monkeypatch.setattr(study, "_robots", broken(lambda depth: None, lambda depth: True))
-    monkeypatch.setattr(start_up, "_timed", broken(lambda *_: (1.0, 1.0), lambda *_: True))
-    monkeypatch.setattr(impacts, "TRUNCATED", ((6, 24),))
-    monkeypatch.setattr(impacts, "_stopped", broken(_stopped, lambda cases, budget: budget == 1))
+    monkeypatch.setattr(growth, "size_sampler", broken(lambda *_: lambda: 1e-6 * next(clock),
+                                                       lambda method, d, c: (d, c) == (24, 60)))
+    monkeypatch.setattr(growth, "late_calls", broken(
+        lambda *_: (0, 1e-6), lambda method, d, c, calls: (method, d, c) == (growth.PRINTED, 3, 60)))
     monkeypatch.setattr(trajectories, "Judge", broken(lambda scene: scene, lambda scene: "cradle" in scene.title))
     ways = {name: name for name in ("IAPB, midpoint", "PB, midpoint", "other")}
-    monkeypatch.setattr(trajectories, "TRAJECTORY_SCENES", dict(list(trajectories.TRAJECTORY_SCENES.items())[:3]))
     monkeypatch.setattr(trajectories, "methods", lambda: ways)
     monkeypatch.setattr(trajectories, "over_steps", broken(_motions, lambda scene, way, *_: way == "other"))
-    topic = study.haptic_study()
+    motions = replace(trajectories.MOTIONS, cases=lambda _: list(trajectories.TRAJECTORY_SCENES)[:3])
+    checks = (growth.SCALING, growth.FITTED, RATE, motions, trajectories.WORTH)
+    topic = replace(BENCH, checks=checks)(Runner(tmp_path), "quick", nothing)
     assert lost(topic) == [
-        f"race on {scenes_at_rest[1].name}", f"parts of a step, {scenes_at_rest[0].name}",
-        "factored, d = 24, c = 60", "printed formula (numpy), d = 24, c = 60", "50 bodies", "robots", "iapb --help",
-        "budget of 1 rows, d = 6, c = 24", "truth of cradle, e = 1", "other on bouncing ball, e = 0.7",
-        "other on peg into a corner, e = 0", "60 contacts in 3 coordinates by the printed formula",
-        "patch of 2 contacts", "pile of 2 contacts",
+        "scaling, factored, d = 24, c = 60", "scaling, printed formula (numpy), d = 24, c = 60",
+        "contacts at 1 kHz, 60 contacts in 3 coordinates by the printed formula", "motions, cradle",
+        "motions, other on bouncing ball, e = 0.7", "motions, other on peg into a corner, e = 0",
     ]  # fmt: skip
 
 
-def _races(scene: Any, *_: Any) -> list[dict[str, Any]]:
-    return [{"scene": scene.name, "MuJoCo's form": "box", "MuJoCo's solver": "Newton", "iapb's contacts": 4,
-             "MuJoCo's contacts": 4, "MuJoCo's step": 100.0, "ratio": 0.01, "target": 0.1}]  # fmt: skip
-
-
-def _step_of(n: int) -> dict[str, Any]:
-    return {"bodies": n, "step": 1.0 * n, "contacts": 1.0, "pairs of shapes": n, "pairs tested": n}
-
-
-def _solver_rows(case: Any, *_: Any) -> list[dict[str, Any]]:
-    names = (step_cost.IAPB, step_cost.KERNEL, "daqp")
-    return [{"impacts": case.family, "contacts": case.contacts, "solver": name, "outcome": "solved", "median": t,
-             "least": t, "largest": t} for name, t in zip(names, (1.0, 0.1, 2.0), strict=True)]  # fmt: skip
-
-
-def _stopped(cases: Any, budget: int) -> list[dict[str, Any]]:
-    return [{"rank": 4, "budget": budget, "share of the loss": 0.5, "largest relative gain": -1.0}]
-
-
 def _motions(*_: Any) -> list[dict[str, Any]]:
-    return [{"position": 0.1, "energy made": 0.0, "time": 1.0, "outcome": "ok", "note": ""}]
+    return [{"step": 1.0, "position": 0.1, "energy made": 0.0, "time": 1.0, "outcome": "ok", "note": ""}]

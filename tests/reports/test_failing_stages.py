@@ -135,15 +135,14 @@ def of_hard_cases(patch: Patch, folder: Path) -> list[str]:
 
 
 def of_accuracy(patch: Patch, folder: Path) -> list[str]:
-    problem = impacts.timed_problems(4, 3)[0]
-    patch.setattr(impacts, "timed_problems", lambda *_: (problem,))
+    patch.setattr(impacts, "TIMED_HARDNESS", impacts.TIMED_HARDNESS[:1])
     patch.setattr(impacts, "_ENOUGH", 0.0)
     first, *others = ways = [way for way in impacts.WAYS if way.rows < 3]
     ways[0] = replace(first, make=broken(first.make, lambda problem: True))
     failures: list[Failure] = []
     table = impacts.work_precision([(4, 3)], ways=ways, progress=nothing, failures=failures)
     assert table.column("work") == [way.work for way in others]
-    return [failure.case.removeprefix(problem.label) for failure in failures]
+    return [failure.case.removeprefix(table.column("problem")[0]) for failure in failures]
 
 
 def of_effects(patch: Patch, folder: Path) -> list[str]:

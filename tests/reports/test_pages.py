@@ -27,7 +27,6 @@ from tests.reports.joined import joined
 from verification.claims import CLAIMS
 from verification.claims.conditions import full_grid
 from verification.claims.peg import FULL
-from verification.cost.effects import COLUMNS as EFFECTS
 from verification.finding import (
     MIXED,
     NOT_COMPUTED,
@@ -103,7 +102,9 @@ def full() -> Evidence:
                 finding_of("mechanics", "Linkages", "Asked <here>.", "All hold.",
                            (Part("It holds to 1e-14.", REPRODUCED),),
                            {"trees": titled(("joints", "error"), ((3, 1e-14),))}),),
-        effects={"peg": table_of(EFFECTS, [{"effect": "gravity", "active": False, "reason": "none in the scene"}])},
+        effects={"peg": titled(
+            ("effect", "active", "reason", "left out", "cost", "change"),
+            [("gravity", False, "none in the scene", "", None, None)])},
         provenance={"commit": "abc"},
         manifest=(StoredFile("a", "runs/a.h5", "k" * 64, "c" * 64, "iapb run a"),),
     )

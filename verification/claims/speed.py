@@ -9,9 +9,9 @@ import numpy as np
 
 from verification.check import Check, Study
 from verification.clock import sampler, take_turns
-from verification.cost.calls import Call, KernelCall, LemkeCall, solver_call
-from verification.cost.growth import ALLOWED, CONTACTS, COORDINATES, haptic_rate, most_contacts
-from verification.cost.step_cost import patch, pile
+from verification.cost.calls import Call, kernel_call, lemke_call, solver_call
+from verification.cost.growth import ALLOWED, CONTACTS, COORDINATES, TITLES, haptic_rate, most_contacts
+from verification.cost.problems import patch, pile
 from verification.region import Region
 from verification.table import Row, Table
 
@@ -20,13 +20,21 @@ from verification.table import Row, Table
 FRESH_SIZES = 15  # number of sizes drawn to confirm a region
 
 
-def _fresh_sizes(study: Study, region: Region) -> Iterator[Row]:
-    """Yield the rows of fresh sizes inside a region."""
+class Sizes(NamedTuple):
+    """Coordinates and the contacts that a method tries with them."""
+
+    coordinates: int
+    method: str
+    contacts: tuple[int, ...] = CONTACTS
+
+
+def _fresh_sizes(study: Study, region: Region) -> Iterator[Sizes]:
+    """Yield fresh sizes inside a region."""
     rng = np.random.default_rng(study.seed)
     ends = (region.ends("coordinates", COORDINATES), region.ends("contacts", CONTACTS))
     for _ in range(FRESH_SIZES):
         d, c = (round(low * (high / low) ** rng.random()) for low, high in ends)
-        yield from haptic_rate((d,), (c,)).by_title()
+        yield from (Sizes(d, method, (c,)) for method in TITLES)
 
 
 def _rate_says(table: Table) -> str:
@@ -43,7 +51,9 @@ C19 = Check(
     "thirds of d coordinates. Methods: the printed formula (21) in numpy, and its factored form, compiled. Once a size "
     "is too slow, larger sizes are not tried. Times are CPU times of the thread on this machine.",
     tolerance="At most one call in a thousand is late. A size that fails is tried three times.",
-    cases=lambda study: haptic_rate().by_title(), row=lambda study, row: row, draw=_fresh_sizes, says=_rate_says,
+    cases=lambda study: [Sizes(d, method) for d in COORDINATES for method in TITLES], draw=_fresh_sizes,
+    row=lambda study, case: haptic_rate(case.coordinates, case.method, case.contacts, failures=study.failures),
+    says=_rate_says,
     holds=lambda row: bool(row["late calls"] <= ALLOWED), parts=["method"],
     conditions=["method", "coordinates", "contacts"], timed=["late calls", "time"], timed_rows=True,
     axes=("contacts", "coordinates", "method"),
@@ -79,7 +89,7 @@ def _new_sizes(study: Study, region: Region) -> list[Impact]:
 def _ratio(study: Study, case: Impact) -> dict[str, Any]:
     """Time both kernels in turns, and divide their times round by round."""
     impact = PROBLEMS[case.problem](case.contacts, np.random.default_rng([study.seed, case.contacts]))
-    calls: dict[str, Call] = {"complementarity": LemkeCall(impact), "IAPB": KernelCall(impact)}
+    calls: dict[str, Call] = {"complementarity": lemke_call(impact), "IAPB": kernel_call(impact)}
     row: dict[str, Any] = {"problem": case.problem, "contacts": case.contacts} | dict.fromkeys(TIMES)
     found = {name: call().copy() for name, call in calls.items()}  # also loads their machine code
     answer = solver_call(impact, "daqp")()

@@ -27,7 +27,8 @@ from reference.one_thread import one_thread
 from verification.check import Check, Study
 from verification.complementarity.families import random_cases
 from verification.complementarity.of_runs import scene_impacts
-from verification.cost.step_cost import patch, pile
+from verification.cost.problems import patch, pile
+from verification.cost.solvers import LONGEST
 from verification.finding import Failure, attempt, verdict_of_trials
 from verification.hard_cases import HARD_CASES, HardCase
 from verification.impacts import Floats, ImpactCase
@@ -35,7 +36,6 @@ from verification.table import Row
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
 FACTORS = np.concatenate([[1.0], np.geomspace(1.5, 1e5, 60)])  # multiples of the fastest solver's time
-LONGEST = {"quick": 0.4, "full": 60.0}  # [s] a solver that takes longer skips all larger problems
 OWN = "own problems"  # name of the collection that `own_problems` makes
 Progress = Callable[[str, int, int], None]
 

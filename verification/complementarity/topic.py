@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,15 @@ from verification.complementarity.agreement import MAP, TWO_CONTACTS
 from verification.complementarity.convergence import CONVERGENCE
 from verification.complementarity.extensions import BAR, FRICTION, UNEQUAL
 from verification.complementarity.piles import piles
-from verification.complementarity.solvers import LONGEST, OWN, SOLVER_LIST, collections
-from verification.cost.step_cost import COST_COLUMNS, STEP_COLUMNS, impact_cost, world_cost
+from verification.complementarity.solvers import OWN, SOLVER_LIST, collections
+from verification.cost.solvers import IMPACT_TIMES
+from verification.cost.steps import STEP_TIMES
 from verification.finding import REPRODUCED, Part
 from verification.mechanics.engine_differences import scene_difference
-from verification.table import Column, Row, Table
+from verification.table import Row, Table
 
 # Optional folder of contact problems by others, next to the project. A clone does not need it.
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "problems"
-REPEATS = {"quick": 3, "full": 7}  # of the timings
 CONFIGURATIONS = 20  # number of configurations of each scene in which engine and references are compared
 # Largest difference of engine and references: the rounding of some dozens of products of entries of size one.
 SAME_MECHANICS = 1e-12
@@ -76,24 +76,6 @@ REFERENCES = Check(
     note="Largest differences between engine and reference: relative to the largest entry for M, B + G and Jacobians, "
     "absolute for contacts. Contacts differ, for example, where two faces are equally deep.",
 )  # fmt: skip
-
-
-def _times(key: str, columns: Sequence[Column], make: Callable[[Study], Table], note: str = "") -> Check:
-    """Return a check that shows a table of times."""
-    return Check(
-        key=key, question="", cases=lambda study: make(study).by_title(), row=lambda study, row: row, note=note,
-        digits=3, conditions=[column.key for column in columns if column.condition],
-        timed=[column.key for column in columns if column.timed],
-    )  # fmt: skip
-
-
-IMPACT_TIMES = _times(
-    "time per impact", COST_COLUMNS, note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. "
-    "Kernels are called from compiled code, all others from Python, checks included.",
-    make=lambda study: impact_cost(repeats=REPEATS[study.depth], longest=LONGEST[study.depth], failures=study.failures),
-)  # fmt: skip
-STEP_TIMES = _times("time per step", STEP_COLUMNS, lambda study: world_cost(repeats=REPEATS[study.depth],
-                                                                           failures=study.failures))  # fmt: skip
 
 
 def _law(study: Study, name: str) -> Row:

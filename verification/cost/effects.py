@@ -11,7 +11,7 @@ whole run.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -29,21 +29,21 @@ from iapb.scene import Scene, scene_names
 from iapb.simulation import Simulation
 from reference.worlds import World, find_world
 from verification.clock import Times, take_turns
-from verification.cost.loop import RecordedLoop
-from verification.finding import Column, Failure, Row, Table, attempt, table_of
+from verification.cost.steps import RecordedLoop
+from verification.finding import Failure, attempt, counted
+from verification.table import Row, Table, table_from
 
 Floats = NDArray[np.float64]
 
 ROUNDS = 9  # number of rounds; each loop runs once per round
 SAMPLES = 400  # number of instants at which positions are compared
-_TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
 class Variant:
     """A variant of a scene: changed values and switches, without impulses or coupling, or without a kind of pairs."""
 
-    values: tuple[tuple[str, Any], ...] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
     impulses: bool = True
     coupled: bool = True
     switches: tuple[str, ...] = ()
@@ -52,29 +52,28 @@ class Variant:
 
 
 LEFT_OUT: dict[str, Variant] = {
-    "gravity": Variant((("gravity", None),)),
-    "varying_inertia": Variant(switches=("varying_inertia",)),
-    "velocity_terms": Variant(switches=("velocity_terms",)),
-    "hand_force": Variant((("hand.force", None), ("hand.force_table", ()), ("hand.force_function", ()))),
-    "joint_damping": Variant(switches=("joint_damping",)),
-    "joint_limits": Variant(switches=("joint_limits",)),
+    **{name: Variant(switches=(name,)) for name in
+       ("varying_inertia", "velocity_terms", "joint_damping", "joint_limits", "unequal_restitution")},
+    "hand_force": Variant({"hand.force": None, "hand.force_table": (), "hand.force_function": ()}),
     "wall_contacts": Variant(untouched="wall"),
     "body_contacts": Variant(untouched="body"),
-    "self_collisions": Variant((("contact.self_collisions", False),)),
     "impulses": Variant(impulses=False),
-    "unequal_restitution": Variant(switches=("unequal_restitution",)),
-    "penalty_stiffness": Variant((("contact.stiffness", 0.0),)),
-    "contact_damping": Variant((("contact.damping", 0.0),)),
-    "friction": Variant((("contact.friction", 0.0),)),
-    "clustering": Variant((("contact.cluster_distance", 0.0),)),
-    "coherence": Variant((("contact.coherence_distance", 0.0),)),
     "coupling": Variant(coupled=False),
-    "delay": Variant((("device.delay", 0),)),
-    "quantisation": Variant((("device.position_resolution", None),)),
-    "device_damping": Variant((("device.damping", None),)),
-    "device_limits": Variant((("device.force_limit", None),)),
-    "waveform": Variant((("device.waveform", "step"),)),
-}
+    **{name: Variant({path: value}) for name, path, value in (
+        ("gravity", "gravity", None),
+        ("self_collisions", "contact.self_collisions", False),
+        ("penalty_stiffness", "contact.stiffness", 0.0),
+        ("contact_damping", "contact.damping", 0.0),
+        ("friction", "contact.friction", 0.0),
+        ("clustering", "contact.cluster_distance", 0.0),
+        ("coherence", "contact.coherence_distance", 0.0),
+        ("delay", "device.delay", 0),
+        ("quantisation", "device.position_resolution", None),
+        ("device_damping", "device.damping", None),
+        ("device_limits", "device.force_limit", None),
+        ("waveform", "device.waveform", "step"),
+    )},
+}  # fmt: skip
 # Effects that a switch of the step can turn on in a scene that does not need them; they then change nothing. Friction
 # in impacts is not among them, because its law needs arrays of its own.
 SWITCHED = tuple(name for name in Switches._fields if name in EFFECT_NAMES and name != "impact_friction")
@@ -93,23 +92,15 @@ _THROUGH_CONTACTS = {
 )
 
 
-# One effect: whether it is on, the reason, and the general consequence of leaving it out; then the measurements in this
-# scene. An effect has no numbers if it is off, cannot be left out, or if the scene cannot run without it; in the last
-# case `change` gives the reason.
-COLUMNS = (
-    Column("effect", condition=True),
-    Column("active"),
-    Column("reason", prose=True),
-    Column("left out", prose=True),
-    Column("step", "µs", timed=True),  # time of the scene with its effects, the same in each row
-    Column("all on", "µs", timed=True),  # time of the scene with all of SWITCHED on
-    Column("faster than real time", "times", timed=True),
-    Column("time saved", "%", timed=True),  # share of the step that leaving the effect out saves; None within the noise
-    Column("position", "mm"),  # largest distance of the tool (without a hand: of any body) from that with the effect
-    Column("device", "mm"),  # the same distance of the device
-    Column("energy", "%"),  # largest change of kinetic energy, relative to its largest value with the effect
-    Column("cost", prose=True, timed=True),
-    Column("change", prose=True),
+# What is measured of an effect. It has no numbers if it is off, cannot be left out, or if the scene cannot run without
+# it; in the last case `change` gives the reason.
+MEASURED = (
+    "time saved [%]",  # share of the step that leaving the effect out saves; None within the noise
+    "position [mm]",  # largest distance of the tool (without a hand: of any body) from that with the effect
+    "device [mm]",  # the same distance of the device
+    "energy [%]",  # largest change of kinetic energy, relative to its largest value with the effect
+    "cost",
+    "change",
 )
 
 
@@ -117,24 +108,20 @@ def effects_of_scenes(
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None
 ) -> dict[str, Table]:
     """Return the measured effects of each shipped scene in the IAPB world."""
-    found, names = {}, scene_names()
-    for done, name in enumerate(names, start=1):
-        found[name] = attempt(name, lambda name=name: effects_of(_scene(name), failures=failures), failures)  # type: ignore[misc]
-        if progress is not None:
-            progress(done, len(names))
-    return {name: effects for name, effects in found.items() if effects is not None}
-
-
-def _scene(name: str) -> Scene:
-    return load_scene(find_scene(name))
+    names, found = scene_names(), dict[str, Table]()
+    for name in counted(names, progress) if progress else names:
+        table = attempt(name, lambda name=name: effects_of(load_scene(find_scene(name)), failures=failures), failures)  # type: ignore[misc]
+        if table is not None:
+            found[name] = table
+    return found
 
 
 def effects_of(
-    scene: Scene, world: str = "IAPB", progress: Callable[[int, int], None] | None = None,
-    failures: list[Failure] | None = None, rounds: int = ROUNDS,
+    scene: Scene, world: str = "IAPB", failures: list[Failure] | None = None, rounds: int = ROUNDS
 ) -> Table:
     """Return every effect of a scene; effects that are on and can be left out are measured.
 
+    Step, all on: the time of the scene with its effects, and with all of SWITCHED on; the same in each row.
     `failures` receives effects that raise an exception other than `IapbError`; if it is None, the exception propagates.
     """
     chosen = find_world(world)
@@ -146,17 +133,17 @@ def effects_of(
             loop = partial(_loop, scene, chosen, LEFT_OUT[effect.name])
             tried[effect.name] = attempt(f"{scene.name}, {effect.name}", loop, failures)
     loops = {name: loop for name, loop in tried.items() if isinstance(loop, Loop)}
-    times = take_turns({_WHOLE: whole.sample} | {name: loop.sample for name, loop in loops.items()}, rounds,
-                       progress=progress)
-    steps = {"step": 1e6 * times[_WHOLE].median, "all on": 1e6 * times[_ALL_ON].median,
-             "faster than real time": scene.step / times[_WHOLE].median}
-    ratios = {name: times[name].over(times[_WHOLE]) for name in loops}
-    measured = {name: {"change": f"without it no run: {loop}"} if isinstance(loop, IapbError) else
-                difference(whole, loop, name, ratios[name]) for name, loop in tried.items()
-                if loop is not None and name != _ALL_ON}
-    return table_of(COLUMNS, (
-        {"effect": effect.name, "active": effect.active, "reason": effect.reason, "left out": effect.left_out,
-         **steps, **measured.get(effect.name, {})} for effect in effects), digits=3)  # fmt: skip
+    times = take_turns({_WHOLE: whole.sample} | {name: loop.sample for name, loop in loops.items()}, rounds)
+    steps = {"step [µs]": 1e6 * times[_WHOLE].median, "all on [µs]": 1e6 * times[_ALL_ON].median,
+             "faster than real time [times]": scene.step / times[_WHOLE].median}
+    measured: dict[str, Row] = {
+        name: difference(whole, loop, name, times[name].over(times[_WHOLE])) if isinstance(loop, Loop) else
+        {"change": f"without it no run: {loop}"} for name, loop in tried.items()
+        if loop is not None and name != _ALL_ON}  # fmt: skip
+    return table_from(({
+        "effect": effect.name, "active": effect.active, "reason": effect.reason, "left out": effect.left_out, **steps,
+        **dict.fromkeys(MEASURED), **measured.get(effect.name, {})} for effect in effects), digits=3,
+        timed=(*steps, "time saved", "cost"), prose=("reason", "left out", "cost", "change"))  # fmt: skip
 
 
 def _loop(scene: Scene, world: World, variant: Variant) -> Loop | IapbError:
@@ -183,37 +170,19 @@ def saved(ratio: Times) -> float | None:
 
 def summary(effects: Mapping[str, Table]) -> Table:
     """Return the data of the figure of time and error, one row per scene and measured effect."""
-    columns = (Column("scene", condition=True), Column("effect", condition=True), Column("time saved", "%", timed=True),
-               Column("error", "mm"), Column("best of its error", timed=True))  # fmt: skip
-    rows = []
-    for scene, table in effects.items():
+
+    def rows(scene: str, table: Table) -> list[Row]:
         measured = [row | {"time saved": row["time saved"] or 0.0} for row in table.records()
                     if row["position"] is not None]
-        front = {row["effect"] for row in measured if not any(_beats(other, row) for other in measured)}
-        rows += [(scene, row["effect"], row["time saved"], row["position"], "yes" if row["effect"] in front else "no")
-                 for row in measured]  # fmt: skip
-    return Table(columns, tuple(rows), digits=3,
-                 note="Best of its error: no other effect saves more time without a larger error. "
-                      f"A time saved of 0: {_BELOW}.")  # fmt: skip
+        return [{"scene": scene, "effect": row["effect"], "time saved [%]": row["time saved"],
+                 "error [mm]": row["position"],
+                 "best of its error": "no" if any(_beats(other, row) for other in measured) else "yes"}
+                for row in measured]  # fmt: skip
 
-
-def steps(effects: Mapping[str, Table]) -> Table:
-    """Return the data of the figure of step times, one row per scene."""
-    columns = (Column("scene", condition=True), Column("effects on"), Column("step", "µs", timed=True),
-               Column("all on", "µs", timed=True), Column("faster than real time", "times", timed=True),
-               Column("shares of the step", prose=True, timed=True))
-    rows = []
-    for scene, table in effects.items():
-        on = [row for row in table.records() if row["active"]]
-        shares = sorted(((row["time saved"], row["effect"]) for row in on if (row["time saved"] or 0.0) > 0.0),
-                        reverse=True)
-        told = ", ".join(f"{effect.replace('_', ' ')} {share:.0f} % ({0.01 * share * on[0]['step']:.2g} µs)"
-                         for share, effect in shares)  # fmt: skip
-        times = (on[0][key] for key in ("step", "all on", "faster than real time"))
-        rows.append((scene, len(on), *times, told or f"each {_BELOW}"))
-    return Table(columns, tuple(rows), digits=3,
-                 note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect. Effects "
-                      f"that are not named are {_BELOW} or cannot be left out. Shares need not add up.")
+    return table_from((row for given in effects.items() for row in rows(*given)), digits=3,
+                      timed=("time saved", "best of its error"),
+                      note="Best of its error: no other effect saves more time without a larger error. "
+                      f"A time saved of 0: {_BELOW}.")
 
 
 def _beats(other: Row, row: Row) -> bool:
@@ -222,40 +191,45 @@ def _beats(other: Row, row: Row) -> bool:
     return one[0] >= two[0] and one[1] >= two[1] and one != two
 
 
-def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> dict[str, Any]:
+def steps(effects: Mapping[str, Table]) -> Table:
+    """Return the data of the figure of step times, one row per scene."""
+
+    def row(scene: str, table: Table) -> Row:
+        on = [row for row in table.records() if row["active"]]
+        first = on[0]
+        shares = sorted(((row["time saved"], row["effect"]) for row in on if (row["time saved"] or 0.0) > 0.0),
+                        reverse=True)
+        told = ", ".join(f"{effect.replace('_', ' ')} {share:.0f} % ({0.01 * share * first['step']:.2g} µs)"
+                         for share, effect in shares)  # fmt: skip
+        return {"scene": scene, "effects on": len(on), "step [µs]": first["step"], "all on [µs]": first["all on"],
+                "faster than real time [times]": first["faster than real time"],
+                "shares of the step": told or f"each {_BELOW}"}  # fmt: skip
+
+    return table_from((row(*given) for given in effects.items()), digits=3, prose=("shares of the step",),
+                      timed=("step", "all on", "faster than real time", "shares of the step"),
+                      note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect. "
+                      f"Effects that are not named are {_BELOW} or cannot be left out. Shares need not add up.")
+
+
+def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
     """Return the measured cells of one effect from the loops with it (`whole`) and without it (`other`)."""
-    kinetic = whole.kinetic()
-    found = {
-        "time saved": saved(ratio),
-        "position": _farthest(whole.places(), other.places()),
-        "device": _farthest(whole.device_places(), other.device_places()),
-        "energy": 100.0 * float(np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), _TINY)),
-    }
-    words = in_words(found)
+    kinetic, share = whole.kinetic(), saved(ratio)
+    place, device = _farthest(whole.places(), other.places()), _farthest(whole.device_places(), other.device_places())
+    energy = 100.0 * float(np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), np.finfo(float).tiny))
+    moved = f"up to {_length(place)} elsewhere" + (f", the device {_length(device)}" if device is not None else "")
+    change = f"{moved}; kinetic energy up to {energy:.3g} % of its largest off"
     if whole.same_motion(other):
-        words["change"] = f"{NOTHING}: {_why_nothing(name, whole.touching())}"
-    return found | words
+        kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
+        touching = whole.touching()
+        met = kind in touching if kind else bool(touching)
+        reason = "all states are the same to the last bit" if met or not absent else absent
+        change = f"{NOTHING}: {reason}"
+    cost = _BELOW if share is None else f"{share:+.0f} % of the step"
+    return dict(zip(MEASURED, (share, place, device, energy, cost, change), strict=True))
 
 
-def _why_nothing(name: str, touching: frozenset[str]) -> str:
-    """Return the reason why the run does not change without the effect, judged by the contacts of the run."""
-    kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
-    if absent and not (touching if not kind else touching & {kind}):
-        return absent
-    return "all states are the same to the last bit"
-
-
-def in_words(found: Row) -> dict[str, str]:
-    """Return in words the effect's cost per step and the change of the motion without it."""
-    moved = f"up to {_length(found['position'])} elsewhere"
-    if found["device"] is not None:
-        moved += f", the device {_length(found['device'])}"
-    return {"cost": _BELOW if found["time saved"] is None else f"{found['time saved']:+.0f} % of the step",
-            "change": f"{moved}; kinetic energy up to {found['energy']:.3g} % of its largest off"}  # fmt: skip
-
-
-def _length(millimetres: float) -> str:
-    return f"{millimetres:.3g} mm" if millimetres < 1e3 else f"{millimetres / 1e3:.3g} m"
+def _length(millimetres: float | None) -> str:
+    return f"{millimetres:.3g} mm" if (millimetres or 0.0) < 1e3 else f"{(millimetres or 0.0) / 1e3:.3g} m"
 
 
 def _farthest(one: Floats, other: Floats) -> float | None:
@@ -264,84 +238,67 @@ def _farthest(one: Floats, other: Floats) -> float | None:
 
 
 class Loop(RecordedLoop):
-    """The simulation loop of a variant of a scene; it keeps the states of the last sample."""
+    """The simulation loop of a variant of a scene."""
 
     def __init__(self, scene: Scene, world: World, variant: Variant) -> None:
-        changed = scene.with_values(_values(scene, variant)) if variant.values else scene
+        force = [0.0] * len(scene.hand.force) if scene.hand is not None else None  # zeros instead of a hand force
+        values = {name: force if name == "hand.force" else value for name, value in variant.values.items()}
+        changed = scene.with_values(values) if values else scene
         law = world.law if variant.impulses else Penalty()
         coupling = world.coupling_in(changed) if variant.coupled else NoCoupling()
         super().__init__(Simulation(changed, law, coupling), scene.steps)
         if variant.untouched:
             _leave_out_pairs(self.simulation, variant.untouched)
         if variant.switches:
-            self.simulation.world = _switched(self.simulation.world, variant.switches, variant.on)
-        self.q = self.v = self.device_q = np.zeros((0, 0))
+            given = self.simulation.world
+            switches = given.switches._content._replace(**dict.fromkeys(variant.switches, variant.on))
+            self.simulation.world = block(given._content._replace(switches=switches))
 
     def same_motion(self, other: Loop) -> bool:
         """Whether positions and velocities of tool and device are equal to the last bit in all steps."""
         ours, theirs = (each.recording.joined("steps") for each in (self, other))
         return all(np.array_equal(ours[name], theirs[name]) for name in ("q", "v", "device_q", "device_v"))
 
-    def touching(self) -> frozenset[str]:
+    def touching(self) -> set[str]:
         """Return the kinds of contacts in the last sample: "wall", "body" (two trees) and "tree" (within one tree)."""
         contacts = self.recording.joined("contacts")
         a, b = contacts["body_a"], contacts["body_b"]
         tree = self.simulation.system.mechanism.tree_of_body
         kinds = np.where(b < 0, "wall", np.where(tree[a] == tree[np.maximum(b, 0)], "tree", "body"))
-        return frozenset(np.unique(kinds).tolist())
+        return set(np.unique(kinds).tolist())
 
-    def sample(self) -> float:
-        """Return the time per step of one whole run [s]."""
-        seconds, every = super().sample(), slice(None, None, max(1, self.steps // SAMPLES))
-        self.q, self.v, self.device_q = (
-            np.concatenate([getattr(record.steps, name) for record in self.recording.records])[every]
-            for name in ("q", "v", "device_q")
-        )
-        return seconds
+    def states(self, name: str) -> Floats:
+        """Return a recorded quantity at the compared instants."""
+        found: Floats = self.recording.joined("steps")[name][:: max(1, self.steps // SAMPLES)]
+        return found
 
     def places(self) -> Floats:
-        """Return points of the held body, or of all bodies without a hand, at the compared instants (n, k, 3) [m]."""
-        held = self.simulation.port.hand_body
-        bodies = slice(None) if held < 0 else slice(held, held + 1)
-        return np.array([_points(self.simulation.system.mechanism, q, bodies) for q in self.q])
+        """Return points of the held body, or of all bodies without a hand, at the compared instants (n, k, 3) [m].
+
+        Four of each body: its centre of mass, and points one radius of gyration away along its axes. The body's origin
+        is not enough, because the origin of a hinged body lies in the hinge and never moves.
+        """
+        held, mechanism, found = self.simulation.port.hand_body, self.simulation.system.mechanism, []
+        bodies, states = slice(None) if held < 0 else slice(held, held + 1), self.states("q")
+        for q in states:
+            for body, R, p in zip(*(each[bodies] for each in (mechanism.bodies, *mechanism.placements(q))),
+                                  strict=True):  # fmt: skip
+                radius = float(np.sqrt(np.trace(body.inertia) / (2.0 * body.mass))) if body.mass > 0.0 else 0.0
+                center = p + R @ np.asarray(body.center_of_mass)
+                found.append((center, *(center + radius * R.T)))
+        return np.array(found).reshape(len(states), -1, 3)
 
     def device_places(self) -> Floats:
         """Return positions of the device's bodies at the compared instants (n, k, 3) [m]; empty without a device."""
         if self.simulation.coupling.name == "none":
             return np.zeros((0, 0, 3))
         device = self.simulation.system.device_mechanism()
-        return np.array([device.placements(q)[1] for q in self.device_q])
+        return np.array([device.placements(q)[1] for q in self.states("device_q")])
 
     def kinetic(self) -> Floats:
         """Return the kinetic energy at the compared instants (n,) [J]."""
-        mechanism = self.simulation.system.mechanism
-        return np.array([mechanism.kinetic_energy(q, v) for q, v in zip(self.q, self.v, strict=True)])
-
-
-def _points(mechanism: Any, q: Floats, bodies: slice) -> Floats:
-    """Return four points of each body [m]: its centre of mass, and points one radius of gyration away along its axes.
-
-    The body's origin is not enough, because the origin of a hinged body lies in the hinge and never moves.
-    """
-    found = []
-    rotation, position = mechanism.placements(q)
-    for body, R, p in zip(mechanism.bodies[bodies], rotation[bodies], position[bodies], strict=True):
-        radius = float(np.sqrt(np.trace(body.inertia) / (2.0 * body.mass))) if body.mass > 0.0 else 0.0
-        center = p + R @ np.asarray(body.center_of_mass)
-        found += [center, *(center + radius * R.T)]
-    return np.array(found)
-
-
-def _values(scene: Scene, variant: Variant) -> dict[str, Any]:
-    """Return the changed values of a variant; a hand force becomes zeros of the same length."""
-    force = [0.0] * len(scene.hand.force) if scene.hand is not None else None
-    return {name: force if name == "hand.force" else value for name, value in variant.values}
-
-
-def _switched(world: Any, names: tuple[str, ...], on: bool) -> Any:
-    """Return the world with these switches of the compiled step on or off."""
-    switches = world.switches._content._replace(**dict.fromkeys(names, on))
-    return block(world._content._replace(switches=switches))
+        states, energy = zip(self.states("q"), self.states("v"), strict=True), self.simulation.system.mechanism
+        return np.array([energy.kinetic_energy(q, v) for q, v in states])
 
 
 def _leave_out_pairs(simulation: Any, kind: str) -> None:

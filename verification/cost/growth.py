@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.clock import TIME_COLUMNS, sampler, seconds, take_turns, time_cells
-from verification.cost.calls import PRINTED, Call, KernelCall, printed_call, random_impact
-from verification.finding import Column, Failure, Table, attempt, table_of
+from verification.check import Check, Study
+from verification.clock import TIMES, sampler, seconds, take_turns, target, time_cells
+from verification.cost.calls import PRINTED, Call, kernel_call, printed_call
+from verification.cost.problems import random_impact
+from verification.finding import Failure, Part, attempt
+from verification.table import Row, Table
 
 FACTORED = "factored"  # the compiled kernel
 SIZES = (
@@ -20,18 +22,11 @@ SIZES = (
     *((d, 60) for d in (3, 6, 24, 48, 96)),
 )  # (d, c)
 PRINTED_UP_TO = 500  # largest number of contacts for the printed formula: with more, one pseudo-inverse takes seconds
-_ROUNDS = 15
-
-SIZE_COLUMNS = (Column("coordinates", condition=True), Column("contacts", condition=True))
-_NOTE = ("Random impacts with rows of rank two thirds of d. The nine hard impacts of a size (Accuracy against time) "
-         "have other ranks, and other times.")
-SCALING_COLUMNS = (Column("method", condition=True), *SIZE_COLUMNS, *TIME_COLUMNS)
+FACTORS = {60: 10.0, 300: 100.0}  # contacts at 12 coordinates -> target factor by which the printed formula is slower
+LARGEST_EXPONENT = 1.1  # target, over contacts
 
 
-def scaling(
-    rounds: int = _ROUNDS, progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
-    sizes: tuple[tuple[int, int], ...] = SIZES,
-) -> Table:
+def scaling(study: Study, sizes: Sequence[tuple[int, int]]) -> list[Row]:
     """Time the factored impact and the printed formula, over contacts and over coordinates.
 
     The printed formula is timed up to PRINTED_UP_TO contacts. Every round times all sizes, so that a temporary slowdown
@@ -39,40 +34,48 @@ def scaling(
     """
     wanted = [(method, d, c) for d, c in sizes for method in (FACTORED, PRINTED)
               if method == FACTORED or c <= PRINTED_UP_TO]  # fmt: skip
+    name = "{0[0]}, d = {0[1]}, c = {0[2]}".format
     with one_thread():
-        made = {size: attempt(_name(size), partial(_sampler, *size), failures) for size in wanted}
-        calls = {size: call for size, call in made.items() if call is not None}
-        times = take_turns(calls, rounds, failures=failures, name=_name, progress=progress)
-    return table_of(
-        SCALING_COLUMNS,
-        ({"method": method, "coordinates": d, "contacts": c, **time_cells(taken)}
-         for (method, d, c), taken in times.items()), digits=3, note=_NOTE,
-    )  # fmt: skip
+        made = {size: attempt(name(size), partial(size_sampler, *size), study.failures) for size in wanted}
+        times = take_turns({size: call for size, call in made.items() if call is not None},
+                           15 if study.depth == "full" else 7, failures=study.failures, name=name)  # fmt: skip
+    return [{"method": method, "coordinates": d, "contacts": c, **time_cells(taken)}
+            for (method, d, c), taken in times.items()]  # fmt: skip
 
 
-def _name(size: tuple[str, int, int]) -> str:
-    return "{}, d = {}, c = {}".format(*size)
-
-
-def _sampler(method: str, d: int, c: int) -> Callable[[], float]:
+def size_sampler(method: str, d: int, c: int) -> Callable[[], float]:
+    """Return the contestant of one size."""
     return sampler(_call(method, d, c))
 
 
 def _call(method: str, d: int, c: int) -> Call:
     case = random_impact(d, c, np.random.default_rng([d, c]))
-    call = KernelCall(case) if method == FACTORED else printed_call(case)
+    call = kernel_call(case) if method == FACTORED else printed_call(case)
     call()  # compiles the kernel and touches its arrays
     return call
 
 
-def exponent(table: Table, method: str, axis: str) -> float:
-    """Return the slope of log(time) over log(axis); axis is "contacts" at d = 12, or "coordinates" at 60 contacts."""
-    return power_law(*_along(table, method, axis))
+def printed_over_factored(table: Table) -> Iterator[tuple[int, float, float, float]]:
+    """Yield (contacts, factored time [µs], printed time [µs], ratio) at d = 12, for the contacts of FACTORS."""
+    for contacts in FACTORS:
+        here = table.where(coordinates=12, contacts=contacts)
+        times = dict(zip(here.column("method"), here.column("time"), strict=True))
+        if {FACTORED, PRINTED} <= set(times):
+            yield contacts, times[FACTORED], times[PRINTED], times[PRINTED] / times[FACTORED]
 
 
-def _along(table: Table, method: str, axis: str) -> tuple[list[float], list[float]]:
-    held = {"coordinates": 12} if axis == "contacts" else {"contacts": 60}
-    chosen = table.where(method=method, **held)
+def _scaling_says(table: Table) -> Iterator[Part]:
+    for contacts, ours, printed, ratio in printed_over_factored(table):
+        yield target(
+            f"With 12 coordinates and {contacts} contacts the engine's (factored) impact takes {ours:.3g} µs, the "
+            f"printed formula {printed:.3g} µs: {ratio:.0f} times as long. Target: at least {FACTORS[contacts]:g}.",
+            ratio >= FACTORS[contacts], f"the factored impact of {contacts} contacts is {ratio:.0f} times as fast as "
+            f"the printed formula (target {FACTORS[contacts]:g})")  # fmt: skip
+
+
+def along(table: Table, method: str, axis: str) -> tuple[list[float], list[float]]:
+    """Return sizes and times of a method over an axis: "contacts" at d = 12, or "coordinates" at 60 contacts."""
+    chosen = table.where(method=method, **({"coordinates": 12} if axis == "contacts" else {"contacts": 60}))
     return chosen.column(axis), chosen.column("time")
 
 
@@ -84,20 +87,46 @@ def power_law(sizes: Sequence[float], values: Sequence[float]) -> float:
 def steepest(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
     """Return the two neighbouring sizes between which log(value) over log(size) is steepest, and the slope there."""
     pairs = sorted(zip(sizes, values, strict=True))
-    slopes = [(power_law([low[0], high[0]], [low[1], high[1]]), low[0], high[0])
-              for low, high in pairwise(pairs)]  # fmt: skip
-    slope, low, high = max(slopes)
+    slope, low, high = max((power_law([low[0], high[0]], [low[1], high[1]]), low[0], high[0])
+                           for low, high in pairwise(pairs))  # fmt: skip
     return low, high, slope
 
 
-def fitted(table: Table) -> Table:
-    """Return the fitted exponents, one row per method and axis."""
-    columns = (Column("method", condition=True), Column("axis", condition=True), Column("exponent", timed=True),
-               Column("steepest from", timed=True), Column("to", timed=True), Column("there", timed=True))
-    rows = tuple((method, axis, exponent(table, method, axis), *steepest(*_along(table, method, axis)))
-                 for method in (FACTORED, PRINTED) for axis in ("contacts", "coordinates"))  # fmt: skip
-    return Table(columns, rows, digits=3, note="Least squares of log time over log size; there: the exponent between "
-                                               "the two neighbouring sizes where it is largest.")
+def fitted(table: Table, method: str, axis: str) -> Row:
+    """Return the exponent of a method over an axis, and where it is steepest."""
+    sizes, times = along(table, method, axis)
+    low, high, there = steepest(sizes, times)
+    return {"method": method, "axis": axis, "exponent": power_law(sizes, times), "steepest from": low, "to": high,
+            "there": there}  # fmt: skip
+
+
+def _growth_says(table: Table) -> Part:
+    rows = {(row["method"], row["axis"]): row for row in table.records()}
+    ours, wide, printed = (rows[key] for key in ((FACTORED, "contacts"), (FACTORED, "coordinates"),
+                                                 (PRINTED, "contacts")))  # fmt: skip
+    ends = ["(steepest from {steepest from:g} to {to:g}: {there:.2f})".format_map(row) for row in (ours, wide)]
+    sizes, power = [c for d, c in SIZES if d == 12], ours["exponent"]
+    return target(
+        f"The time of the factored impact grows as the number of contacts to the power {power:.2f} from {min(sizes)} "
+        f"to {max(sizes)} contacts {ends[0]}, that of the printed formula to the power {printed['exponent']:.2f}. With "
+        f"the number of coordinates it grows to the power {wide['exponent']:.2f} {ends[1]}. Target: at most "
+        f"{LARGEST_EXPONENT:g} for contacts.", power <= LARGEST_EXPONENT,
+        f"the impact's time grows as contacts to the power {power:.2f} (target {LARGEST_EXPONENT:g})")  # fmt: skip
+
+
+SCALING = Check(
+    key="scaling", question="How does the time of an impact grow with its size?", cases=lambda _: (SIZES,),
+    row=scaling, says=_scaling_says, timed=TIMES, digits=3,
+    note="Random impacts with rows of rank two thirds of d. The nine hard impacts of a size (Accuracy against time) "
+    "have other ranks, and other times.",
+)  # fmt: skip
+FITTED = Check(
+    key="fitted", question="With which power does it grow?", says=_growth_says, digits=3,
+    cases=lambda _: [(method, axis) for method in (FACTORED, PRINTED) for axis in ("contacts", "coordinates")],
+    row=lambda study, case: fitted(study.table(SCALING), *case), timed=("exponent", "steepest from", "to", "there"),
+    note="Least squares of log time over log size; there: the exponent between the two neighbouring sizes where it is "
+    "largest.",
+)  # fmt: skip
 
 
 DEADLINE = 1e-3  # [s] one step at the haptic rate of 1 kHz
@@ -106,45 +135,39 @@ _ATTEMPTS = 3  # largest number of attempts of a trial, because other processes 
 COORDINATES = (3, 6, 12, 30)
 CONTACTS = (6, 12, 30, 60, 120, 300, 600, 1200, 3000, 6000, 12000, 30000)
 TITLES = {FACTORED: "factored", PRINTED: "the printed formula"}
-RATE_COLUMNS = (
-    Column("method", condition=True, part=True),
-    *SIZE_COLUMNS,
-    Column("late calls", "of 1000", timed=True),
-    Column("time", "µs", timed=True),
-)
 
 
 def haptic_rate(
-    coordinates: tuple[int, ...] = COORDINATES, contacts: tuple[int, ...] = CONTACTS, calls: int = CALLS,
-    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
-) -> Table:
-    """Test both methods at each number of coordinates and increase the contacts until more than ALLOWED calls are late.
+    d: int, method: str, contacts: Sequence[int] = CONTACTS, calls: int = CALLS, failures: list[Failure] | None = None
+) -> Iterator[Row]:
+    """Test a method at d coordinates and increase the contacts until more than ALLOWED calls are late.
 
-    The table has one row per trial: the number of calls beyond the deadline and the median time of a call, in the first
-    attempt in time or else in the last attempt. An attempt ends when more than ALLOWED calls are late.
-
-    Parameters
-    ----------
-    coordinates, contacts : sizes d and c; the rank of the rows is two thirds of d
-    calls : number of calls in each attempt
+    Yield one row per trial: the number of calls beyond the deadline and the median time of a call, in the first attempt
+    in time or else in the last attempt. An attempt ends when more than ALLOWED calls are late. The rank of the rows is
+    two thirds of d.
     """
-    records: list[dict[str, Any]] = []
-    with one_thread():
-        for done, d in enumerate(coordinates, start=1):
-            for method, title in TITLES.items():
-                for c in contacts:
-                    found = attempt(f"{c} contacts in {d} coordinates by {title}",
-                                    partial(_trial, method, d, c, calls), failures)  # fmt: skip
-                    if found is None:
-                        continue
-                    late, time = found
-                    records.append({"method": title, "coordinates": d, "contacts": c, "late calls": late,
-                                    "time": 1e6 * time})  # fmt: skip
-                    if late > ALLOWED:
-                        break
-            if progress is not None:
-                progress(done, len(coordinates))
-    return table_of(RATE_COLUMNS, records)
+    for c in contacts:
+        with one_thread():
+            found = attempt(f"{c} contacts in {d} coordinates by {TITLES[method]}",
+                            partial(late_calls, method, d, c, calls), failures)  # fmt: skip
+        if found is not None:
+            yield {"method": TITLES[method], "coordinates": d, "contacts": c, "late calls [of 1000]": found[0],
+                   "time [µs]": 1e6 * found[1]}  # fmt: skip
+            if found[0] > ALLOWED:
+                return
+
+
+def late_calls(method: str, d: int, c: int, calls: int) -> tuple[int, float]:
+    """Return the number of late calls and the median time [s]; an attempt stops at more than ALLOWED late calls."""
+    call = _call(method, d, c)
+    for _ in range(_ATTEMPTS):
+        late, times = 0, list[float]()
+        while len(times) < calls and late <= ALLOWED:
+            times.append(seconds(call))
+            late += times[-1] > DEADLINE
+        if late <= ALLOWED:
+            break
+    return late, float(np.median(times))
 
 
 def most_contacts(trials: Table) -> dict[str, dict[int, int]]:
@@ -155,23 +178,3 @@ def most_contacts(trials: Table) -> dict[str, dict[int, int]]:
         in_time = row["contacts"] if row["late calls"] <= ALLOWED else 0
         best[row["coordinates"]] = max(best.get(row["coordinates"], 0), in_time)
     return most
-
-
-def _trial(method: str, d: int, c: int, calls: int) -> tuple[int, float]:
-    call = _call(method, d, c)
-    for _ in range(_ATTEMPTS):
-        late, median = _late_calls(call, calls)
-        if late <= ALLOWED:
-            break
-    return late, median
-
-
-def _late_calls(call: Call, calls: int) -> tuple[int, float]:
-    """Return the number of late calls and the median time [s]; stop when more than ALLOWED calls are late."""
-    late, times = 0, []
-    for _ in range(calls):
-        times.append(seconds(call))
-        late += times[-1] > DEADLINE
-        if late > ALLOWED:
-            break
-    return late, float(np.median(times))

@@ -7,13 +7,13 @@ Methods that can be stopped early run with several amounts of work. `choose` fin
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,21 +21,23 @@ from iapb import resolve_impact
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
-from verification.clock import Times, sampler, seconds, take_turns
+from verification.check import Check, Study
+from verification.clock import sampler, seconds, take_turns, target
 from verification.cost.calls import (
     PRINTED,
     Call,
-    DaqpCall,
     Floats,
-    KernelCall,
-    LemkeCall,
-    SweepsCall,
+    daqp_call,
     engine_call,
+    kernel_call,
+    lemke_call,
     printed_call,
-    random_impact,
+    sweeps_call,
 )
-from verification.finding import Column, Failure, Table, attempt, of_each, table_of
-from verification.impacts import ImpactCase, timed_problems
+from verification.cost.problems import random_impact
+from verification.finding import Failure, Part, attempt, counted
+from verification.impacts import TIMED_HARDNESS, ImpactCase, timed_problems
+from verification.table import Row, Table, table_from, titled
 
 COMPILED, PYTHON = "compiled", "from Python"
 IAPB, SWEEPS, LEMKE = "IAPB", "Gauss-Seidel", "Lemke"
@@ -52,19 +54,23 @@ class Way:
     make: Callable[[ImpactCase], Call]
     rows: int = 0
 
+    @property
+    def key(self) -> tuple[str, str]:
+        """Method and work."""
+        return self.method, self.work
+
 
 ROWS, REPEATED = (1, 2, 4, 8, 16), (1, 4, 16, 64, 256, 1024)
 # To add a method, add a line here.
 WAYS: tuple[Way, ...] = (
-    *(Way(IAPB, f"{rows} row{'s' * (rows > 1)}", COMPILED, partial(KernelCall, budget=rows), rows)
-      for rows in ROWS),
-    Way(IAPB, "all rows", COMPILED, KernelCall),
-    *(Way(SWEEPS, f"{sweeps} sweep{'s' * (sweeps > 1)}", COMPILED, partial(SweepsCall, sweeps=sweeps))
+    *(Way(IAPB, f"{rows} row{'s' * (rows > 1)}", COMPILED, partial(kernel_call, budget=rows), rows) for rows in ROWS),
+    Way(IAPB, "all rows", COMPILED, kernel_call),
+    *(Way(SWEEPS, f"{sweeps} sweep{'s' * (sweeps > 1)}", COMPILED, partial(sweeps_call, sweeps=sweeps))
       for sweeps in REPEATED),
-    Way(LEMKE, "all pivots", COMPILED, LemkeCall),
+    Way(LEMKE, "all pivots", COMPILED, lemke_call),
     Way(CALLED, "all rows", PYTHON, engine_call),
     Way(PRINTED, "as printed", PYTHON, printed_call),
-    Way(QP, "active set", PYTHON, DaqpCall),
+    Way(QP, "active set", PYTHON, daqp_call),
 )
 METHODS = tuple(dict.fromkeys(way.method for way in WAYS))
 SIZES = ((1, 3), (4, 3), (20, 6), (60, 12), (300, 30), (1000, 30))  # (contacts, coordinates)
@@ -73,14 +79,19 @@ LONGEST = 1e-2  # [s] largest time of a call: a slower method is timed once and 
 _ENOUGH = 0.02  # [s] spent on one method of one impact; slow methods get fewer rounds
 LARGEST = 10_000  # contacts or coordinates of one impact: more would take hours or the whole memory
 NO_GAIN = 1e-12  # a relative gain of energy below this is rounding
+TOO_SLOW = "too slow"
 
-METHOD_COLUMNS = (
-    Column("contacts", condition=True), Column("coordinates", condition=True), Column("problem", condition=True),
-    Column("method", condition=True), Column("work", condition=True), Column("called", condition=True),
-    Column("time", "µs", timed=True), Column("quartiles", "µs", timed=True), Column("relative error", timed=True),
-    Column("relative energy gain", timed=True), Column("restitution residual", timed=True),
-    Column("failed after", "µs", timed=True), Column("outcome", timed=True),
-)
+
+class Hard(NamedTuple):
+    """One of the nine hard impacts of a size."""
+
+    contacts: int
+    coordinates: int
+    number: int
+
+
+def _hard(sizes: Iterable[tuple[int, int]]) -> list[Hard]:
+    return [Hard(*size, k) for size in sizes for k in range(len(TIMED_HARDNESS))]
 
 
 def work_precision(
@@ -94,7 +105,7 @@ def work_precision(
     sizes : (contacts, coordinates) of each size
     rounds : number of times that each method is timed, in random order, each time after a warm-up call
     ways : methods, each with an amount of work
-    progress : called as progress(impacts done, number of impacts) after each impact
+    progress : called as progress(impacts done, number of impacts)
     failures : receives exceptions other than `IapbError`, which gives a row; if it is None, they propagate
 
     Returns
@@ -104,33 +115,21 @@ def work_precision(
         (KE⁺ − KE⁻)/KE⁻, or 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is "ok", "too slow" (more than
         LONGEST), or "failed" with its reason. A failed row has only the time until the method gave up.
     """
-    chosen, records = tuple(sizes), list[dict[str, Any]]()
-    slow: set[tuple[str, str]] = set()  # ways that were too slow on an earlier impact
-    for number, (contacts, coordinates) in enumerate(chosen):
-        problems = timed_problems(contacts, coordinates)
-        for done, problem in enumerate(problems, start=1 + number * len(problems)):
-            with one_thread():
-                found = _measure(problem, [way for way in ways if way.rows < coordinates], slow, rounds, failures)
-            records += found
-            slow |= {(row["method"], row["work"]) for row in found if row["outcome"] == TOO_SLOW}
-            if progress is not None:
-                progress(done, len(chosen) * len(problems))
-    note = ("Median CPU times of the thread; methods run in random order, with a warm-up call before each. Errors are "
-            "relative to exact rational arithmetic, in the kinetic metric. A loss of energy counts as a gain of zero.")
-    return table_of(METHOD_COLUMNS, records, digits=3, note=note, timed_rows=True)
+    study, cases = Study(failures=failures), _hard(sizes)
+    each = counted(cases, progress) if progress else cases
+    return ACCURACY.table_of(study.each(each, partial(_measured, ways, rounds, study)))
 
 
-TOO_SLOW = "too slow"
-
-
-def _measure(
-    problem: ImpactCase, ways: Sequence[Way], slow: set[tuple[str, str]], rounds: int, failures: list[Failure] | None
-) -> list[dict[str, Any]]:
+def _measured(ways: Sequence[Way], rounds: int, study: Study, case: Hard) -> Iterator[Row]:
+    """Yield the rows of one impact; a way that was too slow on an earlier impact is not tried again."""
+    problem = timed_problems(*case[:2])[case.number]
+    slow: set[tuple[str, str]] = study.once("slow", set)
     calls: dict[tuple[str, str], Call] = {}
+    ways = [way for way in ways if way.rows < case.coordinates]
 
-    def attempted(way: Way) -> tuple[Floats | str, float]:
+    def tried(way: Way) -> tuple[Floats | str, float]:
         try:
-            call = calls[way.method, way.work] = way.make(problem)
+            call = calls[way.key] = way.make(problem)
         except MissingDependencyError as error:
             return str(error), 0.0
         _try(call)  # a method compiles at its first call
@@ -138,30 +137,29 @@ def _measure(
         spent = seconds(lambda: answer.append(_try(call)))
         return (answer[0] if isinstance(answer[0], str) else answer[0].copy()), spent
 
-    tried = {(way.method, way.work): attempt(f"{problem.label}, {way.method}, {way.work}", partial(attempted, way),
-                                             failures) for way in ways if (way.method, way.work) not in slow}
-    answers = {key: found for key, found in tried.items() if found is not None}
-    working = {key: sampler(calls[key]) for key, (answer, spent) in answers.items()
-               if not isinstance(answer, str) and spent < LONGEST}
-    times = take_turns(working, rounds, warm=False, enough=_ENOUGH)
-    rows = []
+    with one_thread():
+        found = {way.key: ("", LONGEST) if way.key in slow else attempt(
+            f"{problem.label}, {way.method}, {way.work}", partial(tried, way), study.failures) for way in ways}
+        good = [key for key, one in found.items() if one and not isinstance(one[0], str) and one[1] < LONGEST]
+        times = take_turns({key: sampler(calls[key]) for key in good}, rounds, warm=False, enough=_ENOUGH)
     for way in ways:
-        key = way.method, way.work
-        if key not in answers and key not in slow:
+        answer, spent = found[way.key] or (None, 0.0)
+        if answer is None:
             continue
-        answer, spent = answers.get(key, ("", LONGEST))
-        row = {"contacts": problem.contacts, "coordinates": problem.coordinates, "problem": problem.label,
-               "method": way.method, "work": way.work, "called": way.called}
-        if key in slow:
-            row |= {"outcome": TOO_SLOW, "failed after": 1e6 * LONGEST}
-        elif isinstance(answer, str):
-            row |= {"outcome": f"failed: {answer}", "failed after": 1e6 * spent}
+        row: dict[str, Any] = {"contacts": problem.contacts, "coordinates": problem.coordinates,
+                               "problem": problem.label, "method": way.method, "work": way.work, "called": way.called,
+                               **dict.fromkeys(MEASURED), "failed after [µs]": 1e6 * spent}  # fmt: skip
+        if way.key in times:
+            taken = times[way.key]
+            row |= {"time [µs]": 1e6 * taken.median, "outcome": "ok", "failed after [µs]": None,
+                    "quartiles [µs]": f"{taken.lower * 1e6:.3g} to {taken.upper * 1e6:.3g}"}  # fmt: skip
+            row |= _quality(problem, answer)
         elif spent >= LONGEST:
-            row |= {"outcome": TOO_SLOW, "failed after": 1e6 * spent}
+            slow.add(way.key)
+            row["outcome"] = TOO_SLOW
         else:
-            row |= {"outcome": "ok", **_timing(times[key]), **_quality(problem, answer)}
-        rows.append(row)
-    return rows
+            row["outcome"] = f"failed: {answer}"
+        yield row
 
 
 def _try(call: Call) -> Floats | str:
@@ -173,18 +171,13 @@ def _try(call: Call) -> Floats | str:
     return v_plus if np.all(np.isfinite(v_plus)) else "the velocity is not finite"
 
 
-def _timing(times: Times) -> dict[str, Any]:
-    return {"time": 1e6 * times.median, "quartiles": f"{times.lower * 1e6:.3g} to {times.upper * 1e6:.3g}"}
-
-
-def _quality(problem: ImpactCase, v_plus: Floats) -> dict[str, float | None]:
-    lower = np.linalg.cholesky(problem.mass_matrix)
-    speed = float(np.linalg.norm(lower.T @ problem.velocity))
+def _quality(problem: ImpactCase, v_plus: Any) -> Row:
     error = np.array([float(Fraction(x) - t) for x, t in zip(v_plus.tolist(), problem.truth, strict=True)])
-    gain = relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus)
+    upper = problem.lower.T
     found = {
-        "relative error": float(np.linalg.norm(lower.T @ error)) / speed,
-        "relative energy gain": max(gain, 0.0),  # a loss with e < 1 is correct, so it is no error
+        "relative error": float(np.linalg.norm(upper @ error)) / float(np.linalg.norm(upper @ problem.velocity)),
+        # a loss with e < 1 is correct, so it is no error
+        "relative energy gain": max(relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus), 0.0),
         "restitution residual": _residual(problem, v_plus),
     }
     return {name: value if math.isfinite(value) else None for name, value in found.items()}
@@ -192,10 +185,19 @@ def _quality(problem: ImpactCase, v_plus: Floats) -> dict[str, float | None]:
 
 def _residual(case: ImpactCase, v_plus: Floats) -> float:
     """Return max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|)."""
-    mass, J, v = case.arrays
-    lower = np.linalg.cholesky(mass)
-    scale = np.linalg.norm(np.linalg.solve(lower, J.T), axis=0) * np.linalg.norm(lower.T @ v)
+    J, v = case.contact_jacobian, case.velocity
+    scale = np.linalg.norm(case.rows.T, axis=0) * np.linalg.norm(case.lower.T @ v)
     return float(np.max(np.abs(J @ v_plus + case.restitution * (J @ v)) / scale))
+
+
+MEASURED = ("time [µs]", "quartiles [µs]", "relative error", "relative energy gain", "restitution residual",
+            "failed after [µs]", "outcome")  # fmt: skip
+ACCURACY = Check(
+    key="accuracy", question="How exact is an impact in the time that it takes?", cases=lambda _: _hard(SIZES),
+    row=partial(_measured, WAYS, ROUNDS), timed=MEASURED, timed_rows=True, digits=3,
+    note="Median CPU times of the thread; methods run in random order, with a warm-up call before each. Errors are "
+    "relative to exact rational arithmetic, in the kinetic metric. A loss of energy counts as a gain of zero.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -312,35 +314,30 @@ def short_time(seconds_: float) -> str:
     return f"{1e3 * seconds_:.2g} ms" if seconds_ >= 1e-3 else f"{1e6 * seconds_:.3g} µs"
 
 
-CHOICE_COLUMNS = (
-    Column("contacts", condition=True), Column("coordinates", condition=True), Column("budget", "µs", condition=True),
-    Column("method", timed=True), Column("work", timed=True), Column("time", "µs", timed=True),
-    Column("error", timed=True), Column("largest error", timed=True), Column("share solved", "%", timed=True),
-    Column("nearest", timed=True), Column("from Python", timed=True),
-)
+CHOSEN = ("contacts", "coordinates", "budget [µs]", "method", "work", "time [µs]", "error", "largest error",
+          "share solved [%]", "nearest", "from Python")  # fmt: skip
 
 
 def choices(measured: Table) -> Table:
     """Return the result of `choose` for every measured size and every budget."""
-    records: list[dict[str, Any]] = []
-    for contacts, coordinates in dict.fromkeys(measured.select(("contacts", "coordinates")).rows):
-        for budget in BUDGETS:
-            best = choose(measured, budget, contacts, coordinates)
-            python = choose(measured, budget, contacts, coordinates, PYTHON)
-            records.append({
-                "contacts": contacts, "coordinates": coordinates, "budget": 1e6 * budget, "method": "none",
-                "from Python": f"{python.method}, {short_time(python.time)}" if python and python.enough else "none",
-                **(_told(best) if best else {})})
-    return table_of(CHOICE_COLUMNS, records, digits=2, note=(
-        f"Compiled methods; the last column is for calls from Python. None: nothing solves half of the nine impacts to "
-        f"{SOLVED:g} in time; then the nearest method, and its largest error."))
+    return table_from(
+        [_chosen(measured, budget, *size) for size in dict.fromkeys(measured.select(("contacts", "coordinates")).rows)
+         for budget in BUDGETS], digits=2, timed=CHOSEN[3:], note=(
+            f"Compiled methods; the last column is for calls from Python. None: nothing solves half of the nine "
+            f"impacts to {SOLVED:g} in time; then the nearest method, and its largest error."))  # fmt: skip
 
 
-def _told(best: Choice) -> dict[str, Any]:
-    if not best.enough:
-        return {"nearest": f"{best.method}, {best.work}: {best.largest:.1g}"}
-    return {"method": best.method, "work": best.work, "time": 1e6 * best.time, "error": best.error,
-            "largest error": best.largest, "share solved": 100.0 * best.solved}
+def _chosen(measured: Table, budget: float, contacts: int, coordinates: int) -> Row:
+    best, python = (choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON))
+    row = dict.fromkeys(CHOSEN) | {
+        "contacts": contacts, "coordinates": coordinates, "budget [µs]": 1e6 * budget, "method": "none",
+        "from Python": f"{python.method}, {short_time(python.time)}" if python and python.enough else "none"}
+    if best and best.enough:
+        row |= {"method": best.method, "work": best.work, "time [µs]": 1e6 * best.time, "error": best.error,
+                "largest error": best.largest, "share solved [%]": 100.0 * best.solved}  # fmt: skip
+    elif best:
+        row["nearest"] = f"{best.method}, {best.work}: {best.largest:.1g}"
+    return row
 
 
 def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:
@@ -348,28 +345,28 @@ def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:
 
     Both are compiled, or both are called from Python; there IAPB checks its arguments, and DAQP does not.
     """
-    records: list[dict[str, Any]] = []
     rows = measured.where(called=called, outcome="ok").records()
-    name = IAPB if called == COMPILED else CALLED
     ours = {(row["contacts"], row["problem"]): row for row in rows
-            if row["method"] == name and row["work"] == "all rows"}
-    for row in rows:
-        if row["method"] in (IAPB, CALLED, PRINTED):
-            continue
-        mine = ours[row["contacts"], row["problem"]]
+            if row["method"] == (IAPB if called == COMPILED else CALLED) and row["work"] == "all rows"}
+
+    def beats(row: Row, mine: Row) -> bool:
         good = row["relative error"] <= max(1e-6, mine["relative error"]) and row["relative energy gain"] <= NO_GAIN
-        if good and row["time"] < mine["time"]:
-            records.append({"contacts": row["contacts"], "problem": row["problem"], "solver": row["method"],
-                            "work": row["work"], "time": row["time"], "IAPB": mine["time"],
-                            "ratio": mine["time"] / row["time"]})
-    return table_of((Column("contacts", condition=True), Column("problem", condition=True),
-                     Column("solver", condition=True), Column("work", condition=True), Column("time", "µs", timed=True),
-                     Column("IAPB", "µs", timed=True), Column("ratio", timed=True)), records, digits=3, timed_rows=True)
+        return bool(good and row["time"] < mine["time"] and row["method"] not in (IAPB, CALLED, PRINTED))
+
+    pairs = ((row, ours[row["contacts"], row["problem"]]) for row in rows)
+    return titled(
+        ("contacts", "problem", "solver", "work", "time [µs]", "IAPB [µs]", "ratio"), [
+            (row["contacts"], row["problem"], row["method"], row["work"], row["time"], mine["time"],
+             mine["time"] / row["time"]) for row, mine in pairs if beats(row, mine)],
+        digits=3, timed=("time [µs]", "IAPB [µs]", "ratio"), timed_rows=True)  # fmt: skip
 
 
-def order_bias(contacts: int = 4, coordinates: int = 3, rounds: int = 25) -> Table:
-    """Time each method right after each other method; with a fair clock the times do not depend on the order."""
-    problem = timed_problems(contacts, coordinates)[4]
+BIAS, LARGEST_BIAS = (4, 3), 10.0  # (contacts, coordinates) of the impact; [%] target
+
+
+def order_bias(study: Study, rounds: int) -> Iterator[Row]:
+    """Yield a row per method, timed right after each other method: with a fair clock the order does not matter."""
+    problem = timed_problems(*BIAS)[4]
     calls: dict[str, Call] = {}
     for way in WAYS:
         with suppress(MissingDependencyError):
@@ -380,62 +377,77 @@ def order_bias(contacts: int = 4, coordinates: int = 3, rounds: int = 25) -> Tab
         calls[before]()
         return timers[method]()
 
-    pairs = [(before, method) for before in calls for method in calls if before != method]
+    pairs = [(before, method) for method in calls for before in calls if before != method]
     times = take_turns({pair: partial(after, *pair) for pair in pairs}, rounds)
-    records = []
     for method in calls:
-        samples = np.array([times[before, method].samples for before in calls if before != method])
+        others = [before for before in calls if before != method]
+        samples = np.array([times[before, method].samples for before in others])
         middles = np.median(samples / np.median(samples, axis=0), axis=1)  # a slowdown affects a whole round
-        medians = dict(zip((before for before in calls if before != method),
-                           (1e6 * float(np.median(samples)) * middles).tolist(), strict=True))
-        slowest, fastest = max(medians, key=lambda name: medians[name]), min(medians, key=lambda name: medians[name])
-        records.append({"method": method, "least": medians[fastest], "after": fastest, "most": medians[slowest],
-                        "then after": slowest, "spread": 100.0 * (medians[slowest] / medians[fastest] - 1.0)})
-    columns = (Column("method", condition=True), Column("least", "µs", timed=True), Column("after", timed=True),
-               Column("most", "µs", timed=True), Column("then after", timed=True), Column("spread", "%", timed=True))
-    note = (f"{contacts} contacts, {coordinates} coordinates; median of {rounds} rounds, relative to the median of "
-            "each round. Least and most: the methods timed just before.")  # fmt: skip
-    return table_of(columns, records, digits=3, note=note)
+        low, high = int(np.argmin(middles)), int(np.argmax(middles))
+        typical = 1e6 * float(np.median(samples))
+        yield {"method": method, "least [µs]": typical * float(middles[low]), "after": others[low],
+               "most [µs]": typical * float(middles[high]), "then after": others[high],
+               "spread [%]": 100.0 * float(middles[high] / middles[low] - 1.0)}
 
+
+def _bias_says(table: Table) -> Part:
+    worst = max(table.records(), key=lambda row: float(row["spread"]))
+    return target(f"Bias by the order of timing: if a method is timed right after each of the others, its medians "
+                  f"differ by at most {worst['spread']:.2g} % ({worst['method']}). Target: at most {LARGEST_BIAS:g} %.",
+                  worst["spread"] <= LARGEST_BIAS,
+                  f"the order of timing biases {worst['method']} by {worst['spread']:.2g} % (target "
+                  f"{LARGEST_BIAS:g} %)")  # fmt: skip
+
+
+ORDER_BIAS = Check(
+    key="order bias", question="Does the time of a method depend on the method before it?", cases=lambda _: (25,),
+    row=order_bias, says=_bias_says, timed=("least", "after", "most", "then after", "spread"), digits=3,
+    note="{} contacts, {} coordinates; median of 25 rounds, relative to the median of each round. Least and most: the "
+    "methods timed just before.".format(*BIAS),
+)  # fmt: skip
 
 TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
-BUDGET_COLUMNS = (
-    Column("coordinates", condition=True),
-    Column("contacts", condition=True),
-    Column("rank", condition=True),
-    Column("budget", "rows", condition=True),
-    Column("median residual"),
-    Column("largest residual"),
-    Column("share of the loss"),
-    Column("largest relative gain"),
-)
 
 
-def anytime(
-    impacts: int = 40, progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None
-) -> Table:
-    """Resolve random plastic impacts with every row budget from 0 to the rank."""
-    records: list[dict[str, Any]] = []
-    for done, (d, c) in enumerate(TRUNCATED, start=1):
-        cases = [random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0) for k in range(impacts)]
-        records += of_each(range((cases[0].rank or 0) + 1), partial(_stopped, cases), failures,
-                           lambda budget, d=d, c=c: f"budget of {budget} rows, d = {d}, c = {c}")  # type: ignore[misc]  # fmt: skip
-        if progress is not None:
-            progress(done, len(TRUNCATED))
-    return table_of(BUDGET_COLUMNS, records, digits=3,
-                    note="Residual: max |J v⁺ + e J v⁻| in the kinetic metric, of |v⁻|.")  # fmt: skip
+class Stopped(NamedTuple):
+    """Random impacts of d coordinates and c contacts, stopped after a budget of rows."""
+
+    d: int
+    c: int
+    budget: int
 
 
-def _stopped(cases: list[ImpactCase], budget: int) -> list[dict[str, Any]]:
+def stopped(study: Study, case: Stopped) -> Row:
+    """Resolve random plastic impacts with a row budget and return the worst and the typical of them."""
+    d, c, budget = case
+    impacts = [random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0)
+               for k in range(40 if study.depth == "full" else 15)]
     residuals, gains, lost = [], [], []
-    for case in cases:
-        mass, rows, v = case.arrays
+    for one in impacts:
+        mass, rows, v = one.arrays
         v_plus = resolve_impact(mass, rows, v, 0.0, budget=budget).velocity
         full = resolve_impact(mass, rows, v, 0.0).velocity
-        residuals.append(_residual(case, v_plus))
+        residuals.append(_residual(one, v_plus))
         gains.append(relative_energy_gain(mass, v, v_plus))
         before, after, least = (0.5 * float(w @ mass @ w) for w in (v, v_plus, full))
         lost.append((before - after) / (before - least))
-    return [{"coordinates": case.coordinates, "contacts": case.contacts, "rank": case.rank, "budget": budget,
-             "median residual": float(np.median(residuals)), "largest residual": max(residuals),
-             "share of the loss": float(np.median(lost)), "largest relative gain": max(gains)}]  # fmt: skip
+    return {"coordinates": d, "contacts": c, "rank": impacts[0].rank, "budget [rows]": budget,
+            "median residual": float(np.median(residuals)), "largest residual": max(residuals),
+            "share of the loss": float(np.median(lost)), "largest relative gain": max(gains)}  # fmt: skip
+
+
+def _budgets_say(table: Table) -> Part:
+    rows = table.records()
+    gains = sum(row["largest relative gain"] > 0.0 for row in rows)
+    half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
+    return target(
+        f"An impact that stops early, after a budget of rows, gains energy in {gains} of {len(rows)} combinations of "
+        f"size and budget (computed exactly). Half of the rows already take {min(half):.0f} to {max(half):.0f} % of "
+        "the energy that all rows take.", gains == 0, timed=False)  # fmt: skip
+
+
+BUDGET_ROWS = Check(
+    key="budgets", question="What does an impact give that stops early?", row=stopped, says=_budgets_say, digits=3,
+    cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
+    note="Residual: max |J v⁺ + e J v⁻| in the kinetic metric, of |v⁻|.",
+)  # fmt: skip

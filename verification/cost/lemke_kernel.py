@@ -9,17 +9,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from iapb.linalg import cholesky
+from iapb.linalg import cholesky, from_whitened
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 
 lcp_lemke = import_lcp_lemke()
 
 
 @njit(cache=True)
-def repeat_lemke(mass_matrix, rows, v, restitution, times):  # type: ignore[no-untyped-def]
-    """Resolve the impact of v on rows (c, d) `times` times; return v⁺ (d,), NaN if Lemke's method fails."""
+def repeat_lemke(mass_matrix, rows, v, restitution, v_plus, times):  # type: ignore[no-untyped-def]
+    """Resolve the impact of v on rows (c, d) `times` times; write v⁺ (d,), NaN if Lemke's method fails."""
     c, d = rows.shape
-    lower, whitened, v_plus = np.zeros((d, d)), np.zeros((c, d)), np.zeros(d)
+    lower, whitened = np.zeros((d, d)), np.zeros((c, d))
     delassus, offset = np.zeros((c, c)), np.zeros(c)
     for _ in range(times):
         cholesky(mass_matrix, lower)
@@ -38,11 +38,7 @@ def repeat_lemke(mass_matrix, rows, v, restitution, times):  # type: ignore[no-u
         v_plus[:] = 0.0
         for i in range(c):
             v_plus += result.z[i] * (speed / inertia) * whitened[i]
-        for k in range(d - 1, -1, -1):  # v⁺ = v + L⁻ᵀ Aᵀ p
-            for m in range(k + 1, d):
-                v_plus[k] -= lower[m, k] * v_plus[m]
-            v_plus[k] /= lower[k, k]
+        from_whitened(lower, v_plus, v_plus)  # v⁺ = v + L⁻ᵀ Aᵀ p
         v_plus += v
         if not result.success:
             v_plus[:] = np.nan
-    return v_plus

@@ -16,7 +16,7 @@ the curves of each method.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, pi, sin, sqrt
@@ -35,10 +35,11 @@ from reference.simulators.own_engines import own_scene, world_state
 from reference.simulators.scene import FLOOR, RADIUS, WEIGHT, Cuboid, Obstacle, RigidBody, Sphere, rotation
 from reference.simulators.simulator import LOWEST, damping_for
 from reference.simulators.trajectory import steps_between_samples
-from verification.clock import timed
-from verification.cost.loop import RecordedLoop
-from verification.cost.step_cost import IDEAL
-from verification.finding import Column, Failure, Table, attempt, table_of
+from verification.check import Check, Study
+from verification.clock import target, timed
+from verification.cost.steps import IDEAL, RecordedLoop
+from verification.finding import Part, attempt
+from verification.table import Row, Table
 
 _BOUNCE, _FALL, _SPEED = 0.7, 0.1037, 1.0  # e, height [m] above the floor and speed [m/s] downwards at the start
 _PEG = (0.021, 0.0105, 0.0105)  # [m] the sides of the paper's peg, and a third side
@@ -117,55 +118,27 @@ OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float, float]]
 
 
-COLUMNS = (
-    Column("scene", condition=True),
-    Column("method", condition=True),
-    Column("step", "ms", condition=True),
-    Column("time", "ms/s", timed=True),
-    Column("position"),
-    Column("energy"),
-    Column("signed energy"),
-    Column("energy made"),
-    Column("outcome", timed=True),
-    Column("note", timed=True),
-)
-NOTE = (
-    "Errors: position in the sup norm over samples a millisecond apart, relative to the body's length; energies "
-    "relative to the largest kinetic energy."
-)
 BELOW = "below the truth's bound"
 Record = dict[str, Any]
+ERRORS = ("position", "energy", "signed energy", "energy made")
 
 
-def trajectory_precision(
-    scenes: Sequence[str] | None = None, depth: str = "quick", steps: Sequence[float] | None = None,
-    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
-) -> Table:
-    """Run every method that is installed on every scene with every step [s], coarse to fine.
+def motions_of(study: Study, name: str) -> Iterator[Row]:
+    """Yield the runs of every installed method on a scene with every step, coarse to fine.
 
-    Returns
-    -------
-    Table
-        position : largest distance of a body's centre, or of a point half a length beside it, from the truth
-        signed energy : error of the energy at the end; positive is a gain
-        energy made : largest rise of kinetic plus potential energy above its start value, without elastic energy
-        time : computing time per simulated second; of a failed run until it failed, of a time-out the expected time
+    position : largest distance of a body's centre, or of a point half a length beside it, from the truth
+    signed energy : error of the energy at the end; positive is a gain
+    energy made : largest rise of kinetic plus potential energy above its start value, without elastic energy
+    time : computing time per simulated second; of a failed run until it failed, of a time-out the expected time
     """
-    names, ways = tuple(scenes or TRAJECTORY_SCENES), methods()
-    records: list[Record] = []
+    scene = TRAJECTORY_SCENES[name]()
     with one_thread():
-        for done, name in enumerate(names):
-            scene = TRAJECTORY_SCENES[name]()
-            judge = attempt(f"truth of {scene.title}", partial(Judge, scene), failures)
-            if judge is None:
-                continue
-            for turn, (method, way) in enumerate(ways.items(), start=1):
-                over = partial(over_steps, scene, way, judge, steps or STEPS[depth], LONGEST[depth])
-                found = attempt(f"{method} on {scene.title}", over, failures) or []
-                records += [{"scene": scene.title, "method": method, **record} for record in found]
-                if progress is not None:
-                    progress(done * len(ways) + turn, len(names) * len(ways))
-    return table_of(COLUMNS, records, digits=3, note=NOTE)
+        judge = Judge(scene)
+        for method, way in methods().items():
+            over = partial(over_steps, scene, way, judge, STEPS[study.depth], LONGEST[study.depth])
+            for run in attempt(f"{method} on {scene.title}", over, study.failures) or ():
+                yield {"scene": scene.title, "method": method, "step [ms]": run["step"], "time [ms/s]": run["time"],
+                       **{name: run.get(name) for name in (*ERRORS, "outcome", "note")}}  # fmt: skip
 
 
 GAINED = 1.5  # a run belongs to a fit if its error is at least this many times smaller than that of the run before it
@@ -234,7 +207,7 @@ def _by_step(runs: Iterable[Record]) -> list[Record]:
     return sorted(runs, key=lambda run: -float(run["step"]))
 
 
-def by_chance(run: Record) -> bool:
+def by_chance(run: Row) -> bool:
     """Whether the error of position is below the truth's own bound, because the step meets the instants of impact."""
     return "position" in run["note"] and str(run["note"]).endswith(BELOW)
 
@@ -285,16 +258,6 @@ def tenfold_cost(runs: Sequence[Record]) -> float | None:
     return float(10.0 ** (-1.0 / np.polyfit(time, error, 1)[0]))
 
 
-WORTH_COLUMNS = (
-    Column("method", condition=True), Column("called", condition=True),
-    Column("tenfold accuracy costs", timed=True), Column("least cost", timed=True),
-    Column("largest cost", timed=True), Column("scenes fitted", timed=True), Column("error stays", timed=True),
-    Column("least error", timed=True), Column("best for its time", "scenes", timed=True), Column("scenes", timed=True),
-    Column("most exact there", timed=True), Column("least exact there", timed=True), Column("energy made", timed=True),
-    Column("cut short", "scenes", timed=True), Column("failed", "runs", timed=True),
-)
-
-
 def worth(motions: Table, methods: Sequence[str]) -> Table:
     """Return for each method its errors over all scenes, its cost of ten times the accuracy, and its best scenes.
 
@@ -303,31 +266,26 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
     front with an error of at most USEFUL. "Cut short" is the number of scenes in which the method might still reach
     the front with steps that would take too long.
     """
+    return WORTH.table_of(_worth_of(motions, methods))
+
+
+def _worth_of(motions: Table, methods: Sequence[str]) -> Iterator[Row]:
     found = curves(motions, methods)
-    records: list[dict[str, Any]] = []
-    for method in methods:
+    for method in dict.fromkeys(curve.method for curve in sorted(found, key=lambda curve: methods.index(curve.method))):
         mine = [curve for curve in found if curve.method == method]
-        if not mine:
-            continue
         costs = [curve.cost for curve in mine if curve.cost is not None]
         front = [run["position"] for curve in mine for run in curve.front]
-        runs = motions.where(method=method)
-        records.append({
+        yield {
             "method": method, "called": "compiled" if method in INTEGRATORS else "from Python",
             "tenfold accuracy costs": float(np.median(costs)) if costs else None,
             "least cost": min(costs, default=None), "largest cost": max(costs, default=None),
-            "scenes fitted": len(costs), "scenes": len(mine),
-            "error stays": sum(not curve.used and not curve.too_few for curve in mine),
+            "scenes fitted": len(costs), "error stays": sum(not curve.used and not curve.too_few for curve in mine),
             "least error": float(np.median([curve.least for curve in mine])),
-            "best for its time": sum(bool(curve.front) for curve in mine),
+            "best for its time [scenes]": sum(bool(curve.front) for curve in mine), "scenes": len(mine),
             "most exact there": min(front, default=None), "least exact there": max(front, default=None),
             "energy made": max(run["energy made"] for curve in mine for run in curve.runs),
-            "cut short": sum(curve.cut_short for curve in mine),
-            "failed": len(runs.rows) - len(runs.where(outcome="ok").rows)})
-    return table_of(WORTH_COLUMNS, records, digits=2, note=(
-        "Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "
-        f"falls by a factor of {GAINED:g} or more from one to the next, where these are at least {FIT_RUNS} runs and "
-        f"the error falls at least {FIT_FALL:g}-fold over them: it is never extrapolated."))
+            "cut short [scenes]": sum(curve.cut_short for curve in mine),
+            "failed [runs]": sum(run["outcome"] != OK for run in motions.where(method=method).records())}
 
 
 def on_front(row: Record, others: Sequence[Record]) -> bool:
@@ -495,3 +453,66 @@ def _adapter(name: str) -> Motion:
         return motion, spent, set_up
 
     return run
+
+
+def _motions_say(motions: Table) -> Iterator[Part]:
+    """Yield one part per scene with the best errors, and our fastest time at MuJoCo's best accuracy."""
+    for scene in dict.fromkeys(motions.where(outcome=OK).column("scene")):
+        here = motions.where(scene=scene, outcome=OK).records()
+        lost = len(motions.where(scene=scene).rows) - len(here)
+        best = {name: min(chosen, key=lambda run: (run["position"], run["time"]))
+                for name in ("IAPB", "PB", "ideal", "MuJoCo")
+                if (chosen := [run for run in here if run["method"].startswith(name)])}  # fmt: skip
+        text = ", ".join(f"{name} {_error(run)} in {run['time']:.3g} ms per simulated second"
+                         for name, run in best.items())
+        sentence = f"Whole motion, {scene}: smallest position error, in lengths of the body: {text}"
+        most = min(best, key=lambda name: float(best[name]["position"]))
+        met = best["IAPB"]["position"] <= best[most]["position"]
+        miss = f"on the whole motion of {scene} another method is as exact in less time" if met else (
+            f"on the whole motion of {scene} no step of IAPB is as exact as {most} ({_error(best['IAPB'])} against "
+            f"{_error(best[most])})")
+        if "MuJoCo" in best:
+            as_good = [run["time"] for run in here if run["method"].startswith("IAPB")
+                       and run["position"] <= best["MuJoCo"]["position"]]
+            met = met and bool(as_good) and min(as_good) <= best["MuJoCo"]["time"]
+            if as_good:
+                sentence += f"; IAPB reaches MuJoCo's smallest error in {min(as_good):.3g} ms per simulated second"
+        failed = f". {lost} of the runs of all methods failed or took too long" if lost else ""
+        yield target(f"{sentence}{failed}.", met, miss)
+
+
+def _error(run: Row) -> str:
+    return f"{BELOW} of {run['position']:.1e}" if by_chance(run) else f"{run['position']:.1e}"
+
+
+def _worth_says(table: Table) -> Part:
+    rows = {row["method"].split(",")[0].removesuffix(" (QP per step)"): row for row in table.records()}
+    costs = [f"{name} {times(row['tenfold accuracy costs'])} ({row['scenes fitted']} of {row['scenes']} scenes)"
+             for name, row in rows.items() if row["scenes fitted"]]  # fmt: skip
+    stays = [name for name, row in rows.items() if row["error stays"] == row["scenes"]]
+    idle = {name: row for name, row in rows.items() if not row["best for its time"]}
+    never = [name for name, row in idle.items() if not row["cut short"]]
+    cut = [f"{name} on {row['cut short']} of {row['scenes']} scenes" for name, row in idle.items() if row["cut short"]]
+    unknown = f"; not decided, because finer steps would take too long: {', '.join(cut)}" if cut else ""
+    level = f"; with {', '.join(stays)} no shorter step reduces the error" if stays else ""
+    return target("Ten times the accuracy of a whole motion multiplies the computing time by (median over the scenes "
+                  f"where at least {FIT_RUNS} runs span a {FIT_FALL:g}-fold fall of the error): "
+                  f"{', '.join(costs)}{level}. Methods that on every scene are slower and less exact than another, or "
+                  f"miss an error of {USEFUL:g} lengths: {', '.join(never) or 'none'}{unknown}.", True)
+
+
+MOTIONS = Check(
+    key="motions", question="What does the accuracy of a whole motion cost?", cases=lambda _: TRAJECTORY_SCENES,
+    row=motions_of, says=_motions_say, timed=("time", "outcome", "note"), digits=3,
+    note="Errors: position in the sup norm over samples a millisecond apart, relative to the body's length; energies "
+    "relative to the largest kinetic energy.",
+)  # fmt: skip
+WORTH = Check(
+    key="worth", question="Which method is worth its time?", row=lambda _, row: row, says=_worth_says, digits=2,
+    cases=lambda study: list(_worth_of(study.table(MOTIONS), WORLDS)), timed=(
+        "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
+        "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
+    note="Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "
+    f"falls by a factor of {GAINED:g} or more from one to the next, where these are at least {FIT_RUNS} runs and the "
+    f"error falls at least {FIT_FALL:g}-fold over them: it is never extrapolated.",
+)  # fmt: skip

@@ -1,6 +1,6 @@
 """Topic: linkages and free bodies, compared with Pinocchio, closed forms and conservation laws.
 
-Timing (`robot_timing.time_robots`) is a separate study, because its results depend on the machine.
+Timing (`verification.cost.robots`) is part of another topic, because its results depend on the machine.
 """
 
 from __future__ import annotations

@@ -21,9 +21,9 @@ from verification.complementarity.solvers import (
     study_read,
 )
 from verification.complementarity.topic import REFERENCES
-from verification.cost import step_cost
+from verification.cost import solvers as timings
 from verification.cost.calls import PRINTED
-from verification.cost.step_cost import IAPB, KERNEL, LEMKE_KERNEL, impact_cost
+from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL, LEMKE_KERNEL, Size
 from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
 
 
@@ -59,26 +59,33 @@ def test_the_references_are_compared_scene_by_scene() -> None:
     assert wrong.passed is False and REFERENCES.sentences(wrong)[0].verdict == REFUTED
 
 
-def test_every_way_is_timed_on_every_size_and_gives_the_same_motion() -> None:
-    costs = impact_cost((1, 3), ("daqp", "lemke"), repeats=1)
+def test_every_way_is_timed_on_every_size_and_gives_the_same_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timings, "SOLVERS", ("daqp", "lemke"))
+    sizes = [Size(family, contacts) for family in ("patch", "pile") for contacts in (1, 3)]
+    costs = IMPACT_TIMES.table(Study(), sizes)
     assert set(costs.select(("impacts", "contacts", "solver")).rows) == {
-        (family, contacts, solver) for family in ("patch", "pile") for contacts in (1, 3)
-        for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, "daqp", "lemke")
-    }  # fmt: skip
+        (*size, solver) for size in sizes for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, "daqp", "lemke")}
     assert set(costs.column("outcome")) == {"solved"} and min(costs.column("samples")) >= 3
     assert all(row["least"] <= row["median"] <= row["largest"] for row in costs.records())
 
 
 def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = step_cost.solver_call
+    original = timings.solver_call
 
     def wrong(case, name):  # type: ignore[no-untyped-def]
+        if name == "quadprog":
+            raise ZeroDivisionError("planted")
         return (lambda: case.velocity) if name == "lemke" else original(case, name)
 
-    monkeypatch.setattr(step_cost, "solver_call", wrong)
-    patch = impact_cost((1, 2), ("daqp", "lemke"), 1, longest=0.0).where(impacts="patch")
+    monkeypatch.setattr(timings, "solver_call", wrong)
+    monkeypatch.setattr(timings, "SOLVERS", ("daqp", "lemke", "quadprog"))
+    monkeypatch.setitem(timings.LONGEST, "quick", 0.0)
+    study = Study(failures=[])
+    patch = IMPACT_TIMES.table(study, [Size("patch", 1), Size("patch", 2)])
     assert patch.where(contacts=1, solver="lemke").column("outcome") == ["failed"]
     assert patch.where(contacts=2, solver="daqp").column("outcome") == ["left out"]
+    assert patch.where(solver="quadprog").column("outcome") == ["failed", "failed"]
+    assert study.failures and study.failures[0].case == "quadprog on a patch of 1 contacts"
 
 
 def test_a_folder_of_problems(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from reference.rigid_body import model_from_urdf
 from verification.check import Study
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.mechanics import against_pinocchio as study
-from verification.mechanics import robot_timing
 from verification.mechanics.random_urdf import TYPES, random_urdf
 
 ARM = """<robot name="arm">
@@ -56,8 +55,6 @@ def test_robots_that_are_not_there_are_said_to_be_not_there(monkeypatch, tmp_pat
     table = study.AGAINST_PINOCCHIO.table(Study(), cases("joint kinds", study.OTHERS))
     said = list(study.agreement(table))[-1]
     assert said.verdict == NOT_TESTABLE and "nowhere" in said.sentence
-    timed = robot_timing.time_robots(tmp_path / "nowhere")
-    assert timed.passed is None and timed.rows == () and "nowhere" in timed.note
 
 
 def test_a_wrong_mass_is_noticed_in_every_tree(monkeypatch):
@@ -87,14 +84,6 @@ def test_impacts_agree_with_pinocchio_and_another_restitution_does_not(monkeypat
     theirs = study.impulse_dynamics
     monkeypatch.setattr(study, "impulse_dynamics", lambda M, J, v, e: theirs(M, J, v, e + 1e-6))
     assert study.IMPULSE_DYNAMICS.table(Study(), (100,)).passed is False
-
-
-def test_times_are_positive_and_judged_by_form(few, monkeypatch):
-    monkeypatch.setattr(robot_timing, "STATES", 3)
-    monkeypatch.setattr(robot_timing, "ROUNDS", {"quick": 2})
-    table = robot_timing.time_robots(few)
-    assert len(table.rows) == 4 and len(table.holds) == 4
-    assert all(np.array([row[4:] for row in table.rows]).ravel() > 0.0)
 
 
 def test_a_text_has_every_joint_type_and_repeats_with_its_seed():

@@ -1,0 +1,305 @@
+"""The study of the haptic rate: a miss is called a miss, an absent engine is named, every figure has its table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from reports.commands import bench as command
+from reports.figures.cost import anytime, impact_scaling, integrator_precision, trajectory_precision
+from reports.figures.plot import Plot
+from tests.reports.figure_inputs import tables as kept_tables
+from verification.claims.speed import C19, C22
+from verification.cost.calls import PRINTED
+from verification.cost.effects import steps, summary
+from verification.cost.growth import FACTORED, FITTED, SCALING, fitted
+from verification.cost.impacts import ACCURACY, BUDGET_ROWS, ORDER_BIAS
+from verification.cost.robots import MANY, ONE, ROBOTS
+from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL
+from verification.cost.steps import BODIES, IDEAL, PROFILE, RACES, START
+from verification.cost.trajectories import (
+    BELOW,
+    INTEGRATORS,
+    MOTIONS,
+    STIFFENED,
+    TIMED_OUT,
+    WORLDS,
+    WORTH,
+    by_chance,
+    curves,
+    tenfold_cost,
+    worth,
+)
+from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table
+from verification.haptic_rate import BENCH, KERNELS, RATE, SOLVERS, TOPIC, quoting
+from verification.table import table_from
+
+Tables = dict[str, Table]
+
+
+def _races(ratio: float) -> Table:
+    return RACES.table_of([
+        {"scene": "peg in the corner", "MuJoCo's form": "box", "MuJoCo's solver": "Newton", "iapb's contacts": 4,
+         "MuJoCo's contacts": 8, "MuJoCo's step [µs]": 1.0 / ratio, "ratio": ratio, "quartiles": "", "target": 0.1}
+    ])  # fmt: skip
+
+
+def _times(printed: float) -> Table:
+    sizes = [(12, c) for c in (50, 60, 500)] + [(d, 60) for d in (3, 6)]
+    return SCALING.table_of([
+        {"method": method, "coordinates": d, "contacts": c, "time [µs]": t * c * d, "lower quartile [µs]": 1,
+         "upper quartile [µs]": 2}
+        for d, c in sizes for method, t in ((FACTORED, 0.01), (PRINTED, 0.01 * printed))
+    ])  # fmt: skip
+
+
+def _costs(*solvers: tuple[str, float]) -> Table:
+    return IMPACT_TIMES.table_of([
+        {"impacts": "patch", "contacts": 4, "solver": name, "outcome": "solved", "median [µs]": t, "least [µs]": t,
+         "largest [µs]": t} for name, t in solvers])  # fmt: skip
+
+
+def _bodies(*counts: int, step: Callable[[int], float], tested: Callable[[int], int]) -> Table:
+    return BODIES.table_of([{"bodies": n, "step [µs]": step(n), "contacts": 1.0, "pairs of shapes": n * n,
+                             "pairs tested": tested(n)} for n in counts])  # fmt: skip
+
+
+def _run(method: str, step: float, error: float | None, time: float, outcome: str = "ok", note: str = "") -> Any:
+    return {"scene": "ball", "method": method, "step [ms]": step, "time [ms/s]": time, "position": error,
+            "energy": error, "signed energy": error, "energy made": error, "outcome": outcome, "note": note}
+
+
+def _budget(budget: int, gain: float = 0.0) -> Any:
+    return {"coordinates": 6, "contacts": 24, "rank": 4, "budget [rows]": budget, "median residual": 0.1,
+            "largest residual": 0.2, "share of the loss": budget / 4, "largest relative gain": gain}  # fmt: skip
+
+
+def _start(computing: float) -> Table:
+    return START.table_of([{"what": "iapb --help", "on the wall [s]": computing + 0.1, "computing [s]": computing,
+                            "processes": 1, "target [s]": 0.5}])  # fmt: skip
+
+
+def _bias(spread: float) -> Table:
+    return ORDER_BIAS.table_of([{"method": "IAPB", "spread [%]": spread}])
+
+
+def _kernels(*ratios: float) -> Table:
+    return C22.table_of([{"problem": "pile", "contacts": k, "ratio": ratio, "lower quartile": ratio,
+                          "upper quartile": ratio} for k, ratio in enumerate(ratios, 1)])  # fmt: skip
+
+
+LATE = C19.table_of([{"method": name, "coordinates": 3, "contacts": c, "late calls [of 1000]": 0}
+                     for name, c in (("factored", 600), ("the printed formula", 60))])  # fmt: skip
+
+
+@pytest.fixture
+def tables() -> Tables:
+    """Everything as asked for."""
+    motions = MOTIONS.table_of([
+        _run("IAPB, semi-implicit Euler", 1.0, 1e-3, 1.0), _run(STIFFENED, 1.0, 1.0, 1.0),
+        _run("MuJoCo", 1.0, 1e-2, 10.0), _run("MuJoCo", 0.1, None, 3e3, "timed out")])  # fmt: skip
+    scaled = _times(20.0)
+    given = {
+        RACES: _races(0.05), PROFILE: PROFILE.table_of([{"scene": "peg in the corner", "part": "whole step"}]),
+        SCALING: scaled,
+        FITTED: FITTED.table_of([fitted(scaled, *case) for case in FITTED.cases(None)]),  # type: ignore[arg-type]
+        RATE: RATE.table_of([{"coordinates": 3, "most contacts, factored": 600, "most contacts, printed formula": 60}]),
+        BODIES: _bodies(20, 100, 200, step=float, tested=int),
+        ROBOTS: ROBOTS.table_of([{"robot": "arm", "quantity": "bias", "form": form, "ratio": 0.9}
+                                 for form in (ONE, MANY)]),
+        SOLVERS: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4)), START: _start(0.3),
+        BUDGET_ROWS: BUDGET_ROWS.table_of([_budget(budget) for budget in range(5)]),
+        MOTIONS: motions, WORTH: worth(motions, WORLDS), ORDER_BIAS: _bias(4.0),
+    }  # fmt: skip
+    return {check.key: table for check, table in given.items()} | {KERNELS.key: _kernels(2.0, 3.0)}
+
+
+def _found(tables: Tables) -> Finding:
+    found = BENCH.conclude(tables)
+    assert not found.failures
+    return found
+
+
+def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
+    found = _found(tables)
+    assert {part.verdict for part in found.parts} == {found.verdict} == {REPRODUCED}
+    assert f"{len(found.parts)} of {len(found.parts)} speed targets met" in found.answer
+    sentences = "\n".join(part.sentence for part in found.parts)
+    assert "0.05 times MuJoCo's time with box (8 contacts" in sentences
+    assert "600 at d = 3 (60 by the printed formula)" in sentences
+    assert found.timed and not found.parts[-2].timed
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({RACES.key: _races(0.4)}, "0.4 times MuJoCo's time"),
+        ({SCALING.key: _times(5.0)}, "5 times as long"),
+        ({SOLVERS.key: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-5))}, "daqp on the patch at 4 contacts"),
+        ({KERNELS.key: _kernels(2.0, 0.5, 1.0)}, "faster than Lemke's method in 1 of the 2 impacts"),
+        ({START.key: _start(0.8)}, "takes 0.90 s of wall time"),
+        ({BODIES.key: _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2.00"),
+        ({BODIES.key: _bodies(20, 200, step=float, tested=lambda n: n * n)}, "tested pairs"),
+        ({ORDER_BIAS.key: _bias(14.0)}, "at most 14 % (IAPB)"),
+        ({BUDGET_ROWS.key: BUDGET_ROWS.table_of([_budget(2, gain=1e-16)])}, "gains energy in 1 of 1"),
+    ],
+)
+def test_a_miss_is_called_one(tables: Tables, change: Tables, words: str) -> None:
+    missed = [part for part in _found(tables | change).parts if part.verdict == MIXED]
+    assert len(missed) == 1 and words in missed[0].sentence
+    assert missed[0].miss or "a budget of rows" in missed[0].sentence  # the first page has a clause on it
+
+
+def test_figures_draw_every_method_and_failure(tables: Tables) -> None:
+    inputs = {f"haptic-rate/{name}": table for name, table in tables.items()}
+    motions = trajectory_precision.draw(inputs)
+    assert [panel.label for panel in motions.panels] == ["", "ball"]
+    assert [(name, look.filled) for name, look in motions.legend] == [
+        ("IAPB", True), ("PB, stiffened", True), ("MuJoCo", False), ("best for its time", True)]  # fmt: skip
+    without = {**inputs, "haptic-rate/motions": tables["motions"].where(outcome="ok")}
+    assert motions.panels[1].svg != trajectory_precision.draw(without).panels[1].svg
+    assert len(impact_scaling.draw(inputs).panels) == len(anytime.draw(inputs).panels) == 2
+
+
+def test_the_front_of_effects_is_pareto() -> None:
+    rows = [("cheap", True, 10.0, 0.0), ("dear", True, 40.0, 1.0), ("bad", True, 10.0, 2.0), ("off", False, None, None)]
+    keys = ("effect", "active", "time saved", "position")
+    effects = table_from(dict(zip(keys, row, strict=True)) for row in rows)
+    table = summary({"scene": effects})
+    assert {row["effect"]: row["best of its error"] for row in table.records()} == {
+        "cheap": "yes", "dear": "yes", "bad": "no"}  # fmt: skip
+
+
+def test_steps_are_shown_with_the_shares_that_exceed_the_noise() -> None:
+    keys = ("effect", "active", "step", "all on", "faster than real time", "time saved")
+    rows = [("gravity", True, 2.0, 3.0, 500.0, 10.0), ("wall_contacts", True, 2.0, 3.0, 500.0, 40.0),
+            ("friction", True, 2.0, 3.0, 500.0, None), ("delay", False, 2.0, 3.0, 500.0, None)]
+    noisy = [("gravity", True, 1.0, 1.5, 900.0, None)]
+    table = steps({name: table_from(dict(zip(keys, row, strict=True)) for row in each)
+                   for name, each in (("slow", rows), ("quick", noisy))})  # fmt: skip
+    # in the order of the scenes, not of their times: two reports can then be compared row by row
+    assert table.rows == (("slow", 3, 2.0, 3.0, 500.0, "wall contacts 40 % (0.8 µs), gravity 10 % (0.2 µs)"),
+                          ("quick", 1, 1.0, 1.5, 900.0, "each below the noise"))
+
+
+def test_bench_ends_with_1_where_a_row_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    failed = Failure("impact of 4 contacts", "SolverError", "no solution")
+    topic = Finding("haptic-rate", "The haptic rate", "", "", NOT_COMPUTED, failures=(failed,))
+    monkeypatch.setattr(command, "haptic_study", lambda *_: topic)
+    monkeypatch.setattr(command, "work_precision", lambda **_: ACCURACY.table_of(()))
+    monkeypatch.setattr(command, "choices", lambda _: Table(()))
+    answer = command.bench(False, False, "", 20, 6)
+    assert answer.status == 1 and "Not computed: impact of 4 contacts: SolverError: no solution" in answer.lines
+    monkeypatch.setattr(command, "haptic_study", lambda *_: replace(topic, failures=()))
+    assert command.bench(False, False, "", 20, 6).status == 0
+
+
+def _table(**errors: tuple[float, ...]) -> Table:
+    """Runs whose steps and times fall and grow by a hundred from one to the next; " in a note: below the bound."""
+    return MOTIONS.table_of([
+        _run(name, 10.0**-k, error, 1.1 * 100.0**k + (name == "late"), note=f"position {BELOW}" if error < 1e-9 else "")
+        for name, given in errors.items() for k, error in enumerate(given)])  # fmt: skip
+
+
+def test_what_a_tenfold_accuracy_costs_and_who_is_never_worth_it() -> None:
+    """Error over time with slope −1/2 costs a hundredfold; a method behind another on every scene is on no front."""
+    good, late = worth(_table(good=(1e-1, 1e-2, 1e-3), late=(2e-1, 2e-1, 2e-1)), ("good", "late")).records()
+    assert good["tenfold accuracy costs"] == pytest.approx(100.0) and good["best for its time"] == 1
+    assert late["tenfold accuracy costs"] is None and late["least error"] == 2e-1
+    assert late["best for its time"] == 0 and late["error stays"] == 1
+    # a fast run is not worth its time if its error is useless
+    coarse, fine = worth(_table(coarse=(0.9,), fine=(1.0, 0.95, 0.01)), ("coarse", "fine")).records()
+    assert coarse["best for its time"] == 0 and fine["best for its time"] == 1
+
+
+@pytest.mark.parametrize(("errors", "undecided"), [((9e-1, 3e-1), 1), ((9e-1, 8.9e-1), 0)])
+def test_a_method_that_our_limit_of_time_cuts_short_is_not_called_worthless(
+    errors: tuple[float, ...], undecided: int
+) -> None:
+    """Its error still falls where we stop it; where it is level, more time would not help it."""
+    runs = [*_table(good=(1e-1, 1e-2, 1e-3), slow=errors).by_title(), _run("slow", 1e-3, None, 1e9, TIMED_OUT)]
+    motions = MOTIONS.table_of([run | {"time [ms/s]": 2.0 * run["time [ms/s]"]} if run["method"] == "slow" else run
+                                        for run in runs])  # fmt: skip
+    good, slow = worth(motions, ("good", "slow")).records()
+    assert (good["cut short"], slow["cut short"], slow["best for its time"]) == (0, undecided, 0)
+    [part] = WORTH.sentences(worth(motions, ("good", "slow")))
+    assert ("lengths: slow." in part.sentence) == (not undecided)
+    assert ("not decided, because finer steps would take too long: slow on 1 of 1 scenes" in part.sentence) == undecided
+
+
+def test_a_motion_on_which_another_world_is_more_exact_is_a_miss() -> None:
+    errors = {"IAPB, semi-implicit Euler": (1e-1, 1e-2), "PB, semi-implicit Euler": (1.0,), IDEAL: (1e-1, 5e-3)}
+    [part] = MOTIONS.sentences(_table(**errors))
+    assert part.verdict == MIXED and "no step of IAPB is as exact as ideal (1.0e-02 against 5.0e-03)" in part.miss
+    [part] = MOTIONS.sentences(_table(**errors | {IDEAL: (1e-1, 2e-2)}))
+    assert part.verdict == REPRODUCED
+
+
+@pytest.mark.parametrize(("errors", "used", "words"), [
+    ((1e-1, 1e-2, 1e-3), (1e-1, 1e-2, 1e-3), "10× costs 100×"),
+    ((1e-1, 1e-2, 1e-3, 0.9e-3, 1.1e-3), (1e-1, 1e-2, 1e-3), "10× costs 100×, then level"),
+    ((0.9, 1.0, 1e-1, 1e-2), (1.0, 1e-1, 1e-2), "10× costs 100×"),  # the coarse end does not count
+    ((1e-1, 1e-2, 1e-3, 1e-10), (1e-1, 1e-2, 1e-3), "10× costs 100×"),  # exact by chance
+    ((0.5, 0.48, 0.5), (), "stays at 0.48"),
+    # no fit to two runs, nor to three whose errors span less than the tenfold: the measured factors instead
+    ((1e-1, 1e-2, 0.9e-2), (1e-1, 1e-2), "10× costs 100× (2 runs), then level"),
+    ((8e-1, 4e-1, 1e-1), (8e-1, 4e-1, 1e-1), "8× costs 10000× (3 runs)"),
+])
+def test_a_fit_takes_the_runs_on_which_the_error_falls(
+    errors: tuple[float, ...], used: tuple[float, ...], words: str
+) -> None:
+    [curve] = curves(_table(good=errors), ("good",))
+    assert tuple(run["position"] for run in curve.used) == used and curve.words == words
+    assert (curve.cost is None) == (not used or "runs" in words)
+    assert sorted(run["position"] for run in curve.runs) == sorted(errors)
+
+
+@pytest.mark.parametrize(("recipe", "methods"), [(trajectory_precision, WORLDS), (integrator_precision, INTEGRATORS)])
+def test_a_number_uses_exactly_the_strong_marks_that_are_drawn(
+    recipe: Any, methods: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strong, pale = [], []
+
+    def noted(self: Plot, points: Any, look: Any, **how: Any) -> None:
+        (pale if "alpha" in how else strong).append((look.filled, sorted(points)))
+
+    monkeypatch.setattr(Plot, "marks", noted)
+    motions = kept_tables()["haptic-rate/motions"]
+    drawn = recipe.draw({"haptic-rate/motions": motions})
+    found = curves(motions, methods)
+    assert len(found) > 20 and sum(curve.cost is not None for curve in found) > 10
+    for curve in found:
+        assert curve.cost == tenfold_cost(curve.used)
+        compiled = curve.method in INTEGRATORS  # whether a mark is filled says how the method is called
+        assert (compiled, sorted((run["time"], run["position"]) for run in curve.used)) in strong
+        left = sorted((run["time"], run["position"]) for run in curve.left_out if not by_chance(run))
+        assert (compiled, left) in pale
+        [panel] = [panel for panel in drawn.panels if panel.label == curve.scene]
+        assert f": {curve.words}</text>" in panel.svg
+    assert drawn.numbers.rows == worth(motions, methods).rows  # the table in the picture is that of the same runs
+    for row in drawn.numbers.records():
+        assert ("never worth" in drawn.panels[0].alt.split("best for its time: ")[1 + methods_of(drawn, row)]) == (
+            row["best for its time"] == row["cut short"] == 0)  # fmt: skip
+
+
+def methods_of(drawn: Any, row: Any) -> int:
+    """The line of a method in the picture's table."""
+    return int(drawn.numbers.column("method").index(row["method"]))
+
+
+def test_a_report_measures_each_quantity_once_and_quotes_it(tables: Tables) -> None:
+    own = {check.key: tables[check.key] for check in TOPIC.checks}
+    topic = TOPIC.conclude(own)
+    c19, c22 = (Finding(check.key, "", "", "", REPRODUCED, tables={check.key: table})
+                for check, table in ((C19, LATE), (C22, tables[KERNELS.key])))  # fmt: skip
+    costs = Finding("complementarity", "", "", "", REPRODUCED, tables={IMPACT_TIMES.key: tables[SOLVERS.key]})
+    whole = quoting(topic, (c19, c22, costs))
+    assert [(part.sentence, part.verdict) for part in whole.parts] == [
+        (part.sentence, part.verdict) for part in _found(tables).parts]  # fmt: skip
+    assert whole.tables[KERNELS.key] is tables[KERNELS.key] and whole.tables[RATE.key].rows == tables[RATE.key].rows
+    part = quoting(topic, (c19, costs)).parts[-1]
+    assert part.verdict == NOT_COMPUTED and KERNELS.key in part.sentence
+    assert quoting(replace(topic, tables={}), (c19, costs)).parts == topic.parts

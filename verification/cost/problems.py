@@ -1,0 +1,54 @@
+"""Impacts that are timed: random ones, a patch of redundant contacts, and a pile of independent ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from iapb.errors import IapbError
+from verification.impacts import RANK_CUT, ImpactCase
+
+_DRAWS = 1000  # most draws of a patch
+_AGREE = 1e-9  # largest difference of two equal changes of velocity, relative to |v⁻|, in the kinetic metric
+
+
+def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float = 0.5) -> ImpactCase:
+    """Return a random impact with c rows, whose rank is two thirds of d (or c, if this is less)."""
+    rank = max(1, (2 * d) // 3)
+    root, rows = rng.normal(size=(d, d)), rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
+    return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), restitution, rank=rank)
+
+
+def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
+    """Return an impact of a slightly rotating box on `contacts` points of its lower face: d = 6, rank at most 3.
+
+    Points are drawn again until impulses that only push give the velocity of the equalities. Otherwise IAPB and the
+    complementarity solvers would resolve the impact differently, and their times would not compare.
+    """
+    from scipy.optimize import nnls
+
+    up = np.array([0.0, 0.0, 1.0])
+    for _ in range(_DRAWS):
+        points = np.column_stack([rng.uniform(-1.0, 1.0, (contacts, 2)), -0.5 * np.ones(contacts)])
+        rows = np.column_stack([np.tile(up, (contacts, 1)), np.cross(points, up)])
+        velocity = np.array([0.3, 0.1, -1.0, *rng.uniform(-0.2, 0.2, 3)])
+        case = ImpactCase(np.diag([2.0, 2.0, 2.0, 0.5, 0.5, 0.8]), rows, velocity, 0.0, "patch")
+        u = case.lower.T @ velocity
+        change = -np.linalg.lstsq(case.rows, case.rows @ u, rcond=RANK_CUT)[0]
+        if nnls(case.rows.T, change)[1] <= _AGREE * np.linalg.norm(u):
+            return case
+    raise IapbError(f"no patch of {contacts} contacts in {_DRAWS} draws on which impulses only push")
+
+
+def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
+    """Return an impact of a stack of planar boxes with two contacts between neighbours, all approaching."""
+    boxes = (contacts + 1) // 2
+    rows = np.zeros((contacts, 3 * boxes))
+    for i in range(contacts):
+        box, arm = i // 2, 1.0 if i % 2 else -1.0
+        rows[i, 3 * box + 1 : 3 * box + 3] = 1.0, arm
+        if box > 0:
+            rows[i, 3 * box - 2 : 3 * box] = -1.0, -arm
+    velocity = np.zeros(3 * boxes)
+    velocity[1::3] = -np.cumsum(rng.uniform(0.5, 1.0, boxes))
+    velocity[2::3] = rng.uniform(-0.1, 0.1, boxes)
+    return ImpactCase(np.diag(np.tile([1.0, 1.0, 2.0 / 3.0], boxes)), rows, velocity, 0.0, "pile")

@@ -1,0 +1,76 @@
+"""Time of the mass matrix and the bias, per call and for many states in one call, compared with Pinocchio in Python.
+
+Pinocchio is called in its fastest form, a bound function whose result is discarded. Both sides take turns, so that a
+slow phase of the machine affects both; the ratio of each round is compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from iapb.mechanics.mechanism import Mechanism
+from reference.random_mechanisms import random_state
+from reference.rigid_body import model_from_urdf
+from verification.check import Check, Study
+from verification.clock import seconds, take_turns, target
+from verification.finding import NOT_COMPUTED, Part
+from verification.mechanics.against_pinocchio import SEED, SHIPPED, robot_files
+from verification.table import Row, Table
+
+STATES = 200  # random states, one call each, in one round
+ROUNDS = {"quick": 25, "full": 200}
+ONE, MANY = "one state per call", f"{STATES} states in one call"
+LIMITS = {ONE: 3.0, MANY: 1.0}  # target of the ratio
+OTHERS = robot_files()[0]
+FILES = {path.stem: path for path in OTHERS or sorted((SHIPPED / "robots").glob("*.urdf"))}
+WHOSE = "robots of other projects" if OTHERS else "the project's own robots"
+
+
+def time_robot(study: Study, name: str) -> Iterator[Row]:
+    """Yield the times of both quantities in both forms for one robot."""
+    mechanism, rng = Mechanism.from_urdf(FILES[name]), np.random.default_rng(SEED)
+    states = [random_state(rng, mechanism) for _ in range(STATES)]
+    qs, vs = (np.array(rows) for rows in zip(*states, strict=True))
+    their_mass, their_bias = model_from_urdf(FILES[name]).calls()
+    places = [(q,) for q, _ in states]
+    one = (("mass matrix", mechanism.mass_matrix, their_mass, places), ("bias", mechanism.bias, their_bias, states))
+    many = {"mass matrix": lambda: mechanism.mass_matrices(qs), "bias": lambda: mechanism.biases(qs, vs)}
+    for form in LIMITS:
+        for quantity, ours, theirs, given in one:
+            calls = {"ours": partial(_for_each, ours, given) if form == ONE else many[quantity],
+                     "theirs": partial(_for_each, theirs, given)}  # fmt: skip
+            times = take_turns({who: partial(seconds, call) for who, call in calls.items()}, ROUNDS[study.depth])
+            ratio = times["ours"].over(times["theirs"])
+            yield {"robot": name, "velocities": mechanism.nv, "quantity": quantity, "form": form,
+                   "ours [µs]": 1e6 / STATES * times["ours"].median,
+                   "Pinocchio [µs]": 1e6 / STATES * times["theirs"].median, "ratio": ratio.median,
+                   "lower quartile": ratio.lower, "upper quartile": ratio.upper}  # fmt: skip
+
+
+def _for_each(call: Callable[..., object], given: Sequence[tuple[object, ...]]) -> None:
+    for arguments in given:
+        call(*arguments)
+
+
+def _robots_say(table: Table) -> Iterator[Part]:
+    for form, limit in LIMITS.items():
+        rows = table.where(form=form).records() if table.rows else []
+        if not rows:
+            yield Part(f"Mass matrix and bias compared with Pinocchio, {form}: not timed.", NOT_COMPUTED, timed=True)
+            continue
+        worst, best = (choose(rows, key=lambda row: float(row["ratio"])) for choose in (max, min))
+        yield target(
+            f"Mass matrix and bias of {len({row['robot'] for row in rows})} robots ({table.note}), {form}: "
+            f"{best['ratio']:.2g} to {worst['ratio']:.2g} times Pinocchio's time, called from Python (largest for the "
+            f"{worst['quantity']} of {worst['robot']}). Target: {'below' if form == MANY else 'at most'} {limit:g}.",
+            worst["ratio"] <= limit, f"the {worst['quantity']} of {worst['robot']}, {form}, takes "
+            f"{worst['ratio']:.2g} times Pinocchio's time (target {limit:g})")  # fmt: skip
+
+
+ROBOTS = Check(
+    key="robots", question="How long do M and B take, compared with Pinocchio?", cases=lambda _: FILES, row=time_robot,
+    says=_robots_say, timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"), digits=3, note=WHOSE,
+)  # fmt: skip

@@ -1,0 +1,405 @@
+"""Time of a step: against MuJoCo, part by part, over the number of bodies, in each world, and before the first step.
+
+Our loop is `Simulation.advance_chunk`, as in `simulate`, and records every step. MuJoCo's loop is
+`mj_step(model, data, nstep)`, which records nothing. Both run the same number of steps in turns; each round gives one
+ratio. All solvers of MuJoCo are timed, and the fastest solver of each form counts.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iapb.compiled import kernel
+from iapb.contact.kernels.broadphase import near_pairs
+from iapb.contact.kernels.collide import resolve_collisions
+from iapb.contact.kernels.step import clear, find_contacts, locate, move
+from iapb.haptics.kernels import couple, drive_device
+from iapb.recording import Recorder, make_record, write_step
+from iapb.scene import find_scene, load_scene, scene_from_text
+from iapb.simulation import Simulation
+from reference.worlds import find_world
+from verification.check import Check, Study
+from verification.clock import LEAST_ROUNDS, TIMES, seconds, take_turns, target, time_cells, timed
+from verification.cost.growth import power_law, steepest
+from verification.cost.resting import RestingScene, resting_scenes
+from verification.finding import NOT_COMPUTED, Part
+from verification.table import Row, Table
+
+
+class RecordedLoop:
+    """The loop of `simulate`, with its record; it starts again from the first state for every sample of `steps` steps.
+
+    recording : the Recorder of the last sample
+    """
+
+    def __init__(self, simulation: Any, steps: int) -> None:
+        self.simulation, self.steps = simulation, steps
+        self.recording: Recorder
+
+    def sample(self) -> float:
+        """Return the time per step of one whole run [s]; raise the error that stops the run before its end."""
+        simulation, system = self.simulation, self.simulation.system
+        simulation.state, simulation.steps_done = system.make_state(), 0
+        simulation.port = system.make_port(simulation.coupling)
+        self.recording, total = Recorder(simulation), 0.0
+        while self.recording.steps < self.steps:
+            record, size = self.recording.blank(self.steps)
+            if self.recording.steps == 0:
+                simulation.prepare(record)  # the timed call contains steps only
+            (done, stop), spent = timed(partial(simulation.advance_chunk, record, size))
+            self.recording.keep(record, done, spent)
+            total += spent
+            if stop is not None:
+                raise stop
+        return total / self.steps
+
+
+def _record(simulation: Any, steps: int) -> Any:
+    system, coordinates = simulation.system, Recorder(simulation).coordinates
+    return make_record(steps, coordinates, system.capacity, len(system.mechanism.tree_dofs))
+
+
+# Against MuJoCo
+
+STEPS, ROUNDS = 512, {"quick": 9, "full": 20}  # steps of one sample, as in a chunk of `simulate`; samples of each loop
+SOLVERS = ("Newton", "CG", "PGS")
+TARGETS = {"peg in the corner": 0.1}
+SPATIAL_TARGET = 0.5
+
+
+def _scene(name: str) -> RestingScene:
+    return next(scene for scene in resting_scenes() if scene.name == name)
+
+
+def race(study: Study, name: str, steps: int = STEPS) -> Iterator[Row]:
+    """Yield the times of a step of one scene against MuJoCo's, with every form and solver."""
+    scene = _scene(name)
+    ours = OwnLoop(scene, steps)
+    theirs = {(form, solver): _Theirs(scene, form, solver, steps) for form in scene.models for solver in SOLVERS}
+    times = take_turns({"ours": ours.sample, **{key: other.sample for key, other in theirs.items()}},
+                       ROUNDS[study.depth])  # fmt: skip
+    for (form, solver), other in theirs.items():
+        ratio = times["ours"].over(times[form, solver])
+        yield {"scene": name, "MuJoCo's form": form, "MuJoCo's solver": solver, "iapb's contacts": ours.contacts,
+               "MuJoCo's contacts": other.contacts, "MuJoCo's step [µs]": 1e6 * times[form, solver].median,
+               "ratio": ratio.median, "quartiles": f"{ratio.lower:.2g} to {ratio.upper:.2g}",
+               "target": TARGETS.get(name, SPATIAL_TARGET), "iapb's drift": ours.moved,
+               "MuJoCo's drift": other.moved}  # fmt: skip
+
+
+def fastest_of_theirs(races: Table) -> list[Row]:
+    """Return the row with MuJoCo's fastest solver for each scene and form."""
+    by: dict[tuple[str, str], Row] = {}
+    for row in sorted(races.records(), key=lambda row: float(row["MuJoCo's step"])):
+        by.setdefault((row["scene"], row["MuJoCo's form"]), row)
+    return list(by.values())
+
+
+def _races_say(races: Table) -> Iterator[Part]:
+    if not races.rows:
+        yield Part("Time of a step compared with MuJoCo: MuJoCo is not installed: pip install 'iapb[peers]'.",
+                   NOT_COMPUTED, timed=True)
+        return
+    for scene in dict.fromkeys(races.column("scene")):
+        forms = [row for row in fastest_of_theirs(races) if row["scene"] == scene]
+        texts = ["{ratio:.2g} times MuJoCo's time with {MuJoCo's form} ({MuJoCo's contacts:.0f} contacts, solver "
+                 "{MuJoCo's solver}, quartiles {quartiles})".format_map(row) for row in forms]  # fmt: skip
+        largest, (ours, wanted) = max(row["ratio"] for row in forms), (
+            forms[0][key] for key in ("iapb's contacts", "target"))  # fmt: skip
+        yield target(
+            f"{scene.capitalize()}, at rest: a recorded step of the engine, with {ours:.0f} contacts, takes "
+            f"{'; '.join(texts)}. Target: at most {wanted:g}.", largest <= wanted,
+            f"a step of the {scene} takes {largest:.2g} of MuJoCo's time (target {wanted:g})")  # fmt: skip
+
+
+class OwnLoop:
+    """The scene in our loop; every sample starts again and settles before the timed steps."""
+
+    def __init__(self, scene: RestingScene, steps: int) -> None:
+        self.simulation = Simulation(scene_from_text(scene.text, scene.file))
+        self.settling, self.steps = scene.settling, steps
+        self.contacts = self.moved = 0.0
+
+    def sample(self) -> float:
+        """Return the time per step [s]."""
+        self.settle()
+        simulation, record = self.simulation, _record(self.simulation, self.steps)
+        before = simulation.state.q.copy()
+        _, spent = timed(lambda: simulation.advance_chunk(record, self.steps))
+        self.contacts = float(record.steps.contact_count.mean())
+        self.moved = float(np.abs(simulation.state.q - before).max())
+        return spent / self.steps
+
+    def settle(self) -> None:
+        """Start from the first state and simulate until the scene is at rest."""
+        simulation, system = self.simulation, self.simulation.system
+        simulation.state, simulation.port = system.make_state(), system.make_port(simulation.coupling)
+        simulation.advance_chunk(_record(simulation, self.settling), self.settling)
+
+    def part(self, number: int) -> float:
+        """Return the time of one of PARTS per step [s], on the scene at rest."""
+        self.settle()
+        simulation, record = self.simulation, _record(self.simulation, self.steps)
+        arguments = simulation.world, simulation.state, simulation.port, record, number, self.steps
+        return timed(lambda: repeat_part(*arguments))[1] / self.steps
+
+
+class _Theirs:
+    """The scene in MuJoCo's loop."""
+
+    def __init__(self, scene: RestingScene, form: str, solver: str, steps: int) -> None:
+        self.scene, self.model, self.steps = scene, scene.models[form](solver), steps
+        self.contacts = self.moved = 0.0
+
+    def sample(self) -> float:
+        """Return the time per step [s]."""
+        import mujoco
+
+        data = mujoco.MjData(self.model)
+        data.xfrc_applied[-1] = self.scene.push
+        if self.scene.pose:
+            data.qpos[:] = self.scene.pose
+        mujoco.mj_step(self.model, data, self.scene.settling)
+        before, touching = data.qpos.copy(), data.ncon
+        _, spent = timed(lambda: mujoco.mj_step(self.model, data, self.steps))
+        self.contacts = 0.5 * (touching + data.ncon)
+        self.moved = float(np.abs(data.qpos - before).max())
+        return spent / self.steps
+
+
+RACES = Check(
+    key="steps against MuJoCo", question="How long is a step, compared with MuJoCo's?", row=race, says=_races_say,
+    cases=lambda _: [scene.name for scene in resting_scenes()] if find_spec("mujoco") else (), digits=3,
+    timed=("MuJoCo's step", "ratio", "quartiles", "iapb's drift", "MuJoCo's drift"),
+    note="Frictionless (condim 1), with the same masses, forces and step; MuJoCo's other options have default values. "
+    "The engine's steps are recorded, MuJoCo's are not. Ratios are computed for each round of timing; median and "
+    "quartiles are given. Contacts are means over the timed steps. Moved: largest change of a coordinate while timed, "
+    "m or rad.",
+)  # fmt: skip
+
+
+# The parts of a step
+
+# in the order in which `repeat_part` numbers them
+PARTS = ("hand and coupling", "bodies placed", "contacts found", "collisions", "forces and motion", "device", "record")
+
+
+@kernel
+def repeat_part(world: Any, state: Any, port: Any, record: Any, part: Any, times: Any) -> None:
+    """Repeat one part of the step `times` times; on a scene at rest all repetitions do the same work."""
+    for k in range(times):
+        if part == 0:
+            couple(world, state, port)
+        elif part == 1:
+            clear(state)
+            locate(world, state)
+        elif part == 2:
+            find_contacts(world, state)
+        elif part == 3:
+            resolve_collisions(world, state)
+        elif part == 4:
+            state.penalty_force[:] = 0.0
+            state.friction_force[:] = 0.0
+            move(world, state, port.applied)
+        elif part == 5:
+            drive_device(world, state, port)
+        else:
+            write_step(record, k, k, state, port)
+
+
+def profile(study: Study, name: str) -> list[Row]:
+    """Return the times of the whole step and of each of its parts on a scene at rest."""
+    loop = OwnLoop(_scene(name), STEPS)
+    parts = {part: partial(loop.part, k) for k, part in enumerate(PARTS)}
+    times = take_turns({"whole step": loop.sample, **parts}, 15 if study.depth == "full" else 7)
+    return [{"scene": name, "part": part, **time_cells(taken)} for part, taken in times.items()]
+
+
+PROFILE = Check(
+    key="parts of a step", question="Where does the time of a step go?", row=profile, timed=TIMES, digits=3,
+    cases=lambda _: [scene.name for scene in resting_scenes()],
+    note="Each part repeated by itself in compiled code.",
+)  # fmt: skip
+
+
+# Many bodies
+
+COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
+LEAST_BODIES = 20  # with fewer, overhead hides the growth
+RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between them
+CHUNKS, CHUNK_STEPS, REPEATS = 50, 10, 3  # short chunks, so that each chunk has an undisturbed repeat
+LARGEST_POWER = 1.2  # target
+
+
+def field_of_discs(n: int) -> str:
+    """Return the YAML text of a scene of n discs with random velocities over a wall."""
+    rng, columns = np.random.default_rng(0), math.ceil(math.sqrt(n))
+    bodies = [
+        f"  - {{name: disc_{k}, joint: planar, mass: 0.1, inertia: 2e-5, "
+        f"shapes: [{{kind: circle, radius: {RADIUS}}}], "
+        f"position: [{PITCH * (k % columns):.6f}, {PITCH * (k // columns):.6f}, 0], "
+        f"velocity: [{0.3 * rng.normal():.6f}, {0.3 * rng.normal():.6f}, 0]}}"
+        for k in range(n)
+    ]
+    return "\n".join([
+        "name: field_of_discs", "rate: 1000", "duration: 1", "bodies:", *bodies, "walls:",
+        "  - {name: wall, kind: half_plane, point: [0, -0.03], normal: [0, 1]}",
+        "contact: {forces: paper, stiffness: 500, damping: 1, restitution: 0.5, coherence_distance: 1e-3}", "",
+    ])  # fmt: skip
+
+
+def step_of_bodies(study: Study, n: int) -> Row:
+    """Time the same steps several times; each chunk counts with its least time, as other processes only add time."""
+    simulation = Simulation(scene_from_text(field_of_discs(n)))
+    simulation.advance_chunk(_record(simulation, 1), 1)  # compiles
+    quickest = [math.inf] * CHUNKS
+    for _ in range(REPEATS):
+        simulation.state = simulation.system.make_state()
+        contacts, tested = 0.0, 0.0
+        for k in range(CHUNKS):
+            record = _record(simulation, CHUNK_STEPS)
+            _, spent = timed(partial(simulation.advance_chunk, record, CHUNK_STEPS))
+            quickest[k] = min(quickest[k], spent)
+            contacts += float(record.steps.contact_count.mean()) / CHUNKS
+            tested += _tested(simulation) / CHUNKS
+    return {"bodies": n, "step [µs]": 1e6 * sum(quickest) / (CHUNKS * CHUNK_STEPS), "contacts": contacts,
+            "pairs of shapes": len(simulation.world.pairs), "pairs tested": tested}  # fmt: skip
+
+
+def _tested(simulation: Simulation) -> int:
+    """Return the number of pairs that the narrow phase tests at the current positions of the bodies."""
+    world, body = simulation.world, simulation.state.body
+    if not world.switches.broad_phase:
+        return len(world.pairs)
+    return int(near_pairs(world.broad_phase, body.rotation, body.position, 0.0))
+
+
+def _bodies_say(table: Table) -> Iterator[Part]:
+    rows = [row for row in table.records() if row["bodies"] >= LEAST_BODIES]
+    bodies, times, pairs = ([row[key] for row in rows] for key in ("bodies", "step", "pairs tested"))
+    power, tested, last = power_law(bodies, times), power_law(bodies, pairs), rows[-1]
+    where = ""
+    if len(rows) > 2:
+        low, high, slope = steepest(bodies, times)
+        touching = {row["bodies"]: row["contacts"] for row in rows}
+        where = (f"; it grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}, where the contacts "
+                 f"in a step increase from {touching[low]:.2g} to {touching[high]:.2g}")
+    yield target(
+        f"A step of {last['bodies']} free bodies takes {last['step']:.3g} µs. From {LEAST_BODIES} bodies on the time "
+        f"grows as their number to the power {power:.2f}, fitted over all sizes{where}. Target: at most "
+        f"{LARGEST_POWER:g}.", power <= LARGEST_POWER,
+        f"the time of a step grows as the number of bodies to the power {power:.2f} (target {LARGEST_POWER:g})",
+        quantities=(("exponent of bodies", f"{power:.2f}"),))  # fmt: skip
+    yield target(
+        f"With the broad phase the number of tested pairs of shapes grows as the number of bodies to the power "
+        f"{tested:.2f}: {last['pairs tested']:.0f} of {last['pairs of shapes']:,} pairs for {last['bodies']} free "
+        f"bodies. Target: at most {LARGEST_POWER:g}.", tested <= LARGEST_POWER,
+        f"the pairs tested grow as the number of bodies to the power {tested:.2f}", timed=False)  # fmt: skip
+
+
+BODIES = Check(
+    key="bodies", question="How does the time of a step grow with the number of free bodies?", cases=lambda _: COUNTS,
+    row=step_of_bodies, says=_bodies_say, timed=("step",), digits=3,
+)  # fmt: skip
+
+
+# The worlds
+
+COMPILED, STEPPED, IDEAL = "IAPB, compiled loop", "IAPB, step by step", "ideal (QP per step)"
+WAYS = (COMPILED, STEPPED, "PB, compiled loop", IDEAL, "CBuc (QP per step)")
+WORLD_STEPS = 256  # half a second of the peg, with free, colliding and resting steps
+WORLD_ROUNDS = {"quick": LEAST_ROUNDS, "full": 7}
+
+
+def step_in_each_world(study: Study, scene: str) -> list[Row]:
+    """Return the time of a step in each world, as a multiple of a step of IAPB's compiled loop in the same round."""
+    times = take_turns({way: partial(seconds_per_step, scene, way) for way in WAYS}, WORLD_ROUNDS[study.depth],
+                       failures=study.failures, name=lambda way: f"{scene}, {way}")  # fmt: skip
+    ratios = {way: each.over(times[COMPILED]) for way, each in times.items()} if COMPILED in times else {}
+    return [{"scene": scene, "world": way, "median": ratio.median, "least": ratio.least, "largest": ratio.largest,
+             "samples": ratio.rounds} for way, ratio in ratios.items()]  # fmt: skip
+
+
+def seconds_per_step(scene_name: str, way: str) -> float:
+    """Return the time of a step [s], compiled or called from Python."""
+    scene, world = load_scene(find_scene(scene_name)), find_world(way.split(",")[0].split(" ")[0])
+    simulation = Simulation(scene, world.law, world.coupling_in(scene))
+    if way == STEPPED:
+        simulation.step()
+        return seconds(simulation.step, WORLD_STEPS)
+    return RecordedLoop(simulation, WORLD_STEPS).sample()
+
+
+# The rigid worlds solve a QP per step from Python, while the engine's worlds are compiled. Therefore IAPB's step is
+# timed in both ways: in the compiled loop, and one step at a time from Python.
+STEP_TIMES = Check(
+    key="time per step", question="", cases=lambda _: ("peg_corner", "peg_hole"), row=step_in_each_world,
+    timed=("median", "least", "largest"), digits=3,
+)  # fmt: skip
+
+
+# Before the first step
+
+HELP_LIMIT, COMPILE_LIMIT = 0.5, 30.0  # [s]
+HELP, FIRST = "iapb --help", "first steps"
+_HELPS = 5
+# one step in the plane and one in space; the second uses kernels that the first compiled
+_FIRST_STEPS = (
+    "from iapb import find_scene, load_scene, simulate\n"
+    "for name in ('peg_corner', 'arm_obstacles'):\n"
+    "    simulate(load_scene(find_scene(name)), steps=1)\n"
+)
+
+
+def start_up(study: Study, what: str) -> Iterator[Row]:
+    """Time `iapb --help`, or the first steps without and with a cache of compiled kernels."""
+
+    def row(what: str, spent: Any, processes: int, limit: float) -> Row:
+        wall, computing = (float(each) for each in spent)
+        return {"what": what, "on the wall [s]": wall, "computing [s]": computing, "processes": processes,
+                "target [s]": limit}  # fmt: skip
+
+    if what == HELP:
+        helps = [process_time(["-m", "reports.cli", "--help"], {}) for _ in range(_HELPS)]
+        yield row(HELP, np.median(helps, axis=0), _HELPS, HELP_LIMIT)
+        return
+    with tempfile.TemporaryDirectory() as cache:
+        first, second = (np.array(process_time(["-c", _FIRST_STEPS], {"NUMBA_CACHE_DIR": cache})) for _ in range(2))
+    yield row("first steps, all kernels compiled", first - second, 1, COMPILE_LIMIT)
+    yield row("first steps, kernels from the cache", second, 1, COMPILE_LIMIT)
+
+
+def process_time(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:
+    """Return wall and CPU time [s] of a Python process in the project's folder."""
+    before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    subprocess.run([sys.executable, *arguments], cwd=Path(__file__).parents[2], env={**os.environ, **environment},
+                   check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+    wall, after = time.perf_counter() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def _start_says(table: Table) -> Iterator[Part]:
+    for row in table.records():
+        yield target(
+            f"{row['what']} takes {row['on the wall']:.2f} s of wall time and {row['computing']:.2f} s of CPU time. "
+            f"Target: less than {row['target']:g} s of CPU time.", row["computing"] < row["target"],
+            f"{row['what']} takes {row['computing']:.2f} s of CPU time (target {row['target']:g} s)")  # fmt: skip
+
+
+START = Check(
+    key="start", question="How long is the wait before the first step?", row=start_up, says=_start_says, digits=3,
+    cases=lambda study: (HELP, FIRST) if study.depth == "full" else (HELP,), timed=("on the wall", "computing"),
+)  # fmt: skip

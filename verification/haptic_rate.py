@@ -1,0 +1,100 @@
+"""Topic "haptic-rate": times of steps and impacts compared with other engines and solvers, and their growth with size.
+
+`iapb bench` measures everything one after another. A report takes the tables of QUOTED from other findings, so that
+nothing is measured twice (`quoting`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from reference.worlds import run_world
+from verification.check import Check, Topic
+from verification.claims.speed import C19, C22
+from verification.clock import target
+from verification.cost.growth import FITTED, SCALING, TITLES, most_contacts, printed_over_factored
+from verification.cost.impacts import BUDGET_ROWS, ORDER_BIAS
+from verification.cost.robots import ROBOTS
+from verification.cost.solvers import IMPACT_TIMES, solvers_say
+from verification.cost.steps import BODIES, PROFILE, RACES, START
+from verification.cost.trajectories import MOTIONS, WORTH
+from verification.finding import NOT_COMPUTED, REPRODUCED, Finding, Part
+from verification.table import Row, Table
+
+
+def _rates(trials: Table) -> Iterator[Row]:
+    """Yield the largest number of contacts at 1 kHz (claim C19), one row per number of coordinates."""
+    most = most_contacts(trials)
+    for d in dict.fromkeys(trials.column("coordinates")):
+        yield {"coordinates": d} | {name: most.get(title, {}).get(d, 0) for title, name in _MOST.items()}
+
+
+def _rate_says(table: Table) -> Part:
+    texts = [f"{ours} at d = {d} ({printed} by the printed formula)" for d, ours, printed in table.rows]
+    return target("Largest number of contacts at which 99.9 % of the impacts take less than a millisecond (claim C19): "
+                  f"{', '.join(texts)}.", True)
+
+
+def _kernels_say(table: Table) -> Part:
+    """Say where Lemke's method is faster than IAPB by the times of claim C22, which the figure of them shows."""
+    slower, count = table.that(False), len(table.decided)
+    sizes = {name: slower.where(problem=name).column("contacts") for name in dict.fromkeys(slower.column("problem"))}
+    where = " and ".join(f"with {min(found)} to {max(found)} {name}" for name, found in sizes.items())
+    return target(
+        f"One impact, from M, J and v to v⁺ at the same accuracy, compiled on both sides (claim C22): IAPB is faster "
+        f"than Lemke's method in {count - len(slower.rows)} of the {count} impacts whose times differ clearly "
+        f"({len(table.rows) - count} do not){f'; slower {where}' if where else ''}.", not slower.rows,
+        f"compiled, IAPB is slower than Lemke's method in {len(slower.rows)} of {count} impacts")  # fmt: skip
+
+
+def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:
+    met = f"{sum(part.verdict == REPRODUCED for part in parts)} of {len(parts)}"
+    answer = f"{met} speed targets met"
+    for contacts, _, _, ratio in list(printed_over_factored(tables[SCALING.key]))[-1:]:
+        answer += f"; with {contacts} contacts the engine's impact is {ratio:.0f} times as fast as the printed formula"
+    return Part(f"{answer}.", "", quantities=(("speed targets", met),))
+
+
+_MOST = {title: f"most contacts, {title.removeprefix('the ')}" for title in TITLES.values()}
+RATE = Check(
+    key="contacts at 1 kHz", question="How many contacts does a millisecond allow?", row=lambda _, row: row, digits=6,
+    cases=lambda study: list(_rates(study.table(C19))), says=_rate_says, timed=tuple(_MOST.values()),
+    note="Largest size tried of which 999 of 1000 impacts end within 1 ms, on this machine.",
+)  # fmt: skip
+KERNELS = replace(C22, key="compiled, IAPB and Lemke", says=_kernels_say)
+SOLVERS = replace(IMPACT_TIMES, key="solvers", says=solvers_say)
+# key of a check -> finding and table from which a report takes its rows
+QUOTED = {RATE.key: ("C19", "C19"), KERNELS.key: ("C22", "C22"), SOLVERS.key: ("complementarity", IMPACT_TIMES.key)}
+
+BENCH = Topic(
+    key="haptic-rate", title="The haptic rate",
+    question="A haptic loop must finish each step within a millisecond. This page compares the engine's times with "
+    "those of MuJoCo, Pinocchio, the printed formula and complementarity solvers. The programs are timed in turns "
+    "within one run, because ratios depend less on the machine than seconds. Where the engine misses a target, the "
+    "parts of its step show where the time is spent.",
+    checks=(RACES, PROFILE, SCALING, KERNELS, SOLVERS, FITTED, RATE, BODIES, ROBOTS, START, MOTIONS, WORTH, BUDGET_ROWS,
+            ORDER_BIAS), says=_answer,
+)  # fmt: skip
+TOPIC = replace(BENCH, checks=tuple(check for check in BENCH.checks if check.key not in QUOTED))
+
+
+def haptic_study(depth: str, progress: Callable[[int, int], None]) -> Finding:
+    """Measure everything one after another, without any other computation of ours at the same time."""
+    return BENCH(run_world, depth, progress)
+
+
+def quoting(found: Finding, others: Iterable[Finding]) -> Finding:
+    """Return the finding of TOPIC with tables of others: contacts at 1 kHz (C19), and times of solvers (C22).
+
+    If another finding is absent, a part says so.
+    """
+    if not found.tables:
+        return found
+    tables = {check.key: found.tables[check.key] for check in TOPIC.checks if check.key in found.tables}
+    given = {(other.key, name): table for other in others for name, table in other.tables.items()}
+    tables |= {key: RATE.table_of(_rates(given[source])) if key == RATE.key else given[source]
+               for key, source in QUOTED.items() if source in given}  # fmt: skip
+    missing = [Part(f"Not computed: {key}, from {source[0]}.", NOT_COMPUTED, timed=True)
+               for key, source in QUOTED.items() if source not in given]  # fmt: skip
+    return BENCH.conclude(tables, found.failures, missing)
