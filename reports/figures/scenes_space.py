@@ -72,32 +72,32 @@ class Piece:
 )  # fmt: skip
 def scenes_space(*runs: Run) -> Drawn:
     """Draw every scene at the moments of its `Sight`."""
-    return Drawn(tuple(panel for sight, run in zip(SIGHTS, runs, strict=True) for panel in panels_of(sight, run)))
-
-
-def panels_of(sight: Sight, run: Run) -> Iterator[Panel]:
-    """Yield a picture of the run for each moment; all pictures of a scene have the same scale."""
-    scene = run.scene_resolved
-    steps = [round(share * run.steps) for share in sight.moments]
-    drawn = [sorted(pieces(sight, scene, run.pose[step]), key=lambda piece: piece.nearness) for step in steps]
-    corners = np.vstack([sight.seen.flat(piece.points) for each in drawn for piece in each])
-    margin = _MARGIN * np.ptp(corners, axis=0).max()
-    low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
-    for step, each in zip(steps, drawn, strict=True):
-        with Canvas(f"scenes-space-{run.scene_name}-{step}", low, high, PANEL) as canvas:
-            for order, piece in enumerate(each):
-                flat, over = sight.seen.flat(piece.points), {"zorder": 2 + 1e-3 * order}
-                if len(flat) == 2:
-                    canvas.axes.plot(*flat.T, color=piece.edge, linewidth=piece.width, **over)
-                    continue
-                canvas.axes.fill(*flat.T, facecolor=piece.face, edgecolor="none", alpha=piece.alpha, **over)
-                canvas.axes.fill(*flat.T, facecolor="none", edgecolor=piece.edge, linewidth=piece.width,
-                                 joinstyle="round", **over)  # fmt: skip
-            if scene["hand"]:
-                place = body_placements(scene, run.pose[step])[scene["hand"]["body"]]
-                hand(canvas.axes, scene, place, 0.16 * float(max(high - low)), sight.seen.flat)
-        moment = f"{run.time[step]:.2f} s"
-        yield Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.", f"{run.scene_name}, {moment}")
+    panels = []
+    for sight, run in zip(SIGHTS, runs, strict=True):
+        scene = run.scene_resolved
+        steps = [round(share * run.steps) for share in sight.moments]
+        drawn = [sorted(pieces(sight, scene, run.pose[step]), key=lambda piece: piece.nearness) for step in steps]
+        # all pictures of a scene have the same scale
+        corners = np.vstack([sight.seen.flat(piece.points) for each in drawn for piece in each])
+        margin = _MARGIN * np.ptp(corners, axis=0).max()
+        low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+        for step, each in zip(steps, drawn, strict=True):
+            with Canvas(f"scenes-space-{run.scene_name}-{step}", low, high, PANEL) as canvas:
+                for order, piece in enumerate(each):
+                    flat, over = sight.seen.flat(piece.points), {"zorder": 2 + 1e-3 * order}
+                    if len(flat) == 2:
+                        canvas.axes.plot(*flat.T, color=piece.edge, linewidth=piece.width, **over)
+                        continue
+                    canvas.axes.fill(*flat.T, facecolor=piece.face, edgecolor="none", alpha=piece.alpha, **over)
+                    canvas.axes.fill(*flat.T, facecolor="none", edgecolor=piece.edge, linewidth=piece.width,
+                                     joinstyle="round", **over)  # fmt: skip
+                if scene["hand"]:
+                    place = body_placements(scene, run.pose[step])[scene["hand"]["body"]]
+                    hand(canvas.axes, scene, place, 0.16 * float(max(high - low)), sight.seen.flat)
+            moment = f"{run.time[step]:.2f} s"
+            alt = f"{scene['title']}, from aside, after {moment}."
+            panels.append(Panel(canvas.svg, alt, f"{run.scene_name}, {moment}"))
+    return Drawn(tuple(panels))
 
 
 def pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Piece]:
