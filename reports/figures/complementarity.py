@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -157,55 +156,47 @@ def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
     solvers = sorted(dict.fromkeys(numbers.column("solver")), key=lambda name: name not in TIMED)[: len(TIMED)]
     styles = looks_of(solvers) | {name: TIMED[name] for name in solvers if name in TIMED}
     most = max(numbers.column("contacts"))
-    panels = [_family(numbers.where(impacts=family).records(), styles, family, most)
-              for family in dict.fromkeys(numbers.column("impacts"))]  # fmt: skip
+    panels = []
+    for family in dict.fromkeys(numbers.column("impacts")):
+        rows = numbers.where(impacts=family).records()
+        top = 3.0 * max(row["largest"] for row in rows if row["largest"] is not None)
+        with Plot(f"cost-of-contacts-{family}", (4.6, 3.9)) as plot:
+            for name, style in styles.items():
+                mine = [row for row in rows if row["solver"] == name]
+                timed = [row for row in mine if row["median"] is not None]
+                at = [row["contacts"] for row in timed]
+                if len(at) > 1:
+                    plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
+                                           color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
+                plot.axes.plot(at, [row["median"] for row in timed], **line_arguments(style))
+                for row in mine:
+                    if row["median"] is None:  # not run
+                        plot.axes.plot(row["contacts"], top, "^", color=style.color, markersize=6, zorder=5)
+                    elif row["outcome"] == "failed":
+                        plot.axes.plot(row["contacts"], row["median"], "x", color=style.color, markersize=10,
+                                       markeredgewidth=1.8, zorder=5)  # fmt: skip
+            plot.log("contacts", "time of one impact [µs]")
+            contacts = sorted({row["contacts"] for row in rows})
+            plot.axes.set_xticks(contacts, [str(count) for count in contacts])
+        words = ", ".join(f"{row['solver']} {row['median']:.3g}" for row in rows
+                          if row["contacts"] == most and row["median"] is not None)  # fmt: skip
+        alt = f"Median times of a {family} of {most} contacts in microseconds: {words}."
+        panels.append(Panel(plot.svg, alt, family))
+    ways, scenes = (list(dict.fromkeys(steps.column(name))) for name in ("world", "scene"))
+    with Plot("cost-of-contacts-steps", (4.6, 2.4)) as plot:
+        for number, (scene, style) in enumerate(looks_of(scenes).items()):
+            for row in steps.where(scene=scene).records():
+                y = ways.index(row["world"]) + 0.24 * (number - (len(scenes) - 1) / 2)
+                plot.axes.plot([row["least"], row["largest"]], [y, y], color=style.color, linewidth=1.2)
+                plot.marks([(row["median"], y)], replace(style, name=""), markersize=5)
+            plot.axes.plot([], [], style.marker, color=style.color, label=scene)
+        plot.log("time of one step, over IAPB's compiled", "", "x", ylim=(len(ways) - 0.4, -0.6))
+        plot.axes.set_yticks(range(len(ways)), ways)
+        plot.axes.legend(loc="upper right", fontsize=8)
     words = ", ".join(f"{row['scene']} {row['world']} {row['median']:.3g}" for row in steps.records())
-    panels.append(Panel(_steps(steps), f"Median times of one step, in times IAPB's compiled: {words}.",
+    panels.append(Panel(plot.svg, f"Median times of one step, in times IAPB's compiled: {words}.",
                         "one step of a world"))
     return Drawn(tuple(panels), numbers, tuple((look.name, look) for look in styles.values()))
-
-
-def _family(rows: Rows, styles: Mapping[str, LineStyle], family: str, most: int) -> Panel:
-    from matplotlib.ticker import NullLocator
-
-    top = 3.0 * max(row["largest"] for row in rows if row["largest"] is not None)
-    with Plot(f"cost-of-contacts-{family}", (4.6, 3.9)) as plot:
-        for name, style in styles.items():
-            timed = [row for row in rows if row["solver"] == name and row["median"] is not None]
-            at = [row["contacts"] for row in timed]
-            if len(at) > 1:
-                plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
-                                       color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
-            plot.axes.plot(at, [row["median"] for row in timed], **line_arguments(style))
-            for row in (row for row in rows if row["solver"] == name):
-                if row["median"] is None:  # not run
-                    plot.axes.plot(row["contacts"], top, "^", color=style.color, markersize=6, zorder=5)
-                elif row["outcome"] == "failed":
-                    plot.axes.plot(row["contacts"], row["median"], "x", color=style.color, markersize=10,
-                                   markeredgewidth=1.8, zorder=5)  # fmt: skip
-        plot.log("contacts", "time of one impact [µs]")
-        contacts = sorted({row["contacts"] for row in rows})
-        plot.axes.set_xticks(contacts, [str(count) for count in contacts])
-        plot.axes.xaxis.set_minor_locator(NullLocator())
-    words = ", ".join(f"{row['solver']} {row['median']:.3g}" for row in rows
-                      if row["contacts"] == most and row["median"] is not None)  # fmt: skip
-    return Panel(plot.svg, f"Median times of a {family} of {most} contacts in microseconds: {words}.", family)
-
-
-def _steps(numbers: Table) -> str:
-    ways, scenes = (list(dict.fromkeys(numbers.column(name))) for name in ("world", "scene"))
-    with Plot("cost-of-contacts-steps", (4.6, 2.4)) as plot:
-        axes = plot.axes
-        for number, (scene, style) in enumerate(looks_of(scenes).items()):
-            for row in numbers.where(scene=scene).records():
-                y = ways.index(row["world"]) + 0.24 * (number - (len(scenes) - 1) / 2)
-                axes.plot([row["least"], row["largest"]], [y, y], color=style.color, linewidth=1.2)
-                plot.marks([(row["median"], y)], replace(style, name=""), markersize=5)
-            axes.plot([], [], style.marker, color=style.color, label=scene)
-        plot.log("time of one step, over IAPB's compiled", "", "x", ylim=(len(ways) - 0.4, -0.6))
-        axes.set_yticks(range(len(ways)), ways)
-        axes.legend(loc="upper right", fontsize=8)
-    return plot.svg
 
 
 @recipe(
