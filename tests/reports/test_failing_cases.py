@@ -110,4 +110,4 @@ def test_haptic_rate(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def _motions(*_: Any) -> list[dict[str, Any]]:
-    return [{"step": 1.0, "position": 0.1, "energy made": 0.0, "time": 1.0, "outcome": "ok", "note": ""}]
+    return [{"step [ms]": 1.0, "position": 0.1, "energy made": 0.0, "time [ms/s]": 1.0, "outcome": "ok", "note": ""}]

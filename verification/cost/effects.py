@@ -216,7 +216,8 @@ def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
     kinetic, share = whole.kinetic(), saved(ratio)
     place, device = _farthest(whole.places(), other.places()), _farthest(whole.device_places(), other.device_places())
     energy = 100.0 * float(np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), np.finfo(float).tiny))
-    moved = f"up to {_length(place)} elsewhere" + (f", the device {_length(device)}" if device is not None else "")
+    moved = f"up to {_length(place or 0.0)} elsewhere"
+    moved += f", the device {_length(device)}" if device is not None else ""
     change = f"{moved}; kinetic energy up to {energy:.3g} % of its largest off"
     if whole.same_motion(other):
         kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
@@ -228,8 +229,8 @@ def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
     return dict(zip(MEASURED, (share, place, device, energy, cost, change), strict=True))
 
 
-def _length(millimetres: float | None) -> str:
-    return f"{millimetres:.3g} mm" if (millimetres or 0.0) < 1e3 else f"{(millimetres or 0.0) / 1e3:.3g} m"
+def _length(millimetres: float) -> str:
+    return f"{millimetres:.3g} mm" if millimetres < 1e3 else f"{millimetres / 1e3:.3g} m"
 
 
 def _farthest(one: Floats, other: Floats) -> float | None:

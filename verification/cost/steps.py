@@ -117,8 +117,8 @@ def _races_say(races: Table) -> Iterator[Part]:
         forms = [row for row in fastest_of_theirs(races) if row["scene"] == scene]
         texts = ["{ratio:.2g} times MuJoCo's time with {MuJoCo's form} ({MuJoCo's contacts:.0f} contacts, solver "
                  "{MuJoCo's solver}, quartiles {quartiles})".format_map(row) for row in forms]  # fmt: skip
-        largest, (ours, wanted) = max(row["ratio"] for row in forms), (
-            forms[0][key] for key in ("iapb's contacts", "target"))  # fmt: skip
+        ours, wanted = forms[0]["iapb's contacts"], forms[0]["target"]
+        largest = max(row["ratio"] for row in forms)
         yield target(
             f"{scene.capitalize()}, at rest: a recorded step of the engine, with {ours:.0f} contacts, takes "
             f"{'; '.join(texts)}. Target: at most {wanted:g}.", largest <= wanted,

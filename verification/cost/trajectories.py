@@ -137,8 +137,7 @@ def motions_of(study: Study, name: str) -> Iterator[Row]:
         for method, way in methods().items():
             over = partial(over_steps, scene, way, judge, STEPS[study.depth], LONGEST[study.depth])
             for run in attempt(f"{method} on {scene.title}", over, study.failures) or ():
-                yield {"scene": scene.title, "method": method, "step [ms]": run["step"], "time [ms/s]": run["time"],
-                       **{name: run.get(name) for name in (*ERRORS, "outcome", "note")}}  # fmt: skip
+                yield {"scene": scene.title, "method": method, **run}
 
 
 GAINED = 1.5  # a run belongs to a fit if its error is at least this many times smaller than that of the run before it
@@ -322,30 +321,23 @@ def methods() -> dict[str, Motion]:
 
 def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[float], longest: float) -> list[Record]:
     """Run one method with every step; failures and runs that would take longer than `longest` [s] also give rows."""
-    records: list[Record] = []
+    runs: list[Record] = []
     per_step = 0.0
-
-    def add(step: float, outcome: str, note: str, seconds: float, **errors: float) -> None:
-        records.append({"step": 1e3 * step, "time": 1e3 * seconds / scene.duration, "outcome": outcome, "note": note,
-                        **errors})
-
     for step in sorted(steps, reverse=True):
-        expected = per_step * scene.duration / step
-        if expected > longest:
-            add(step, TIMED_OUT, f"would take {expected:.2g} s", expected)
-            continue
-        found, spent = timed(partial(_tried, way, scene, step))
-        if isinstance(found, Exception):
-            add(step, FAILED, " ".join(f"{type(found).__name__}: {found}".split())[:160], spent)
-            continue
-        motion, seconds = found
-        per_step = seconds / (scene.duration / step)
-        if motion.finite:
-            errors, note = judge.errors(motion)
-            add(step, OK, note, seconds, **errors)
-        else:
-            add(step, FAILED, "not a number", seconds)
-    return records
+        seconds = per_step * scene.duration / step
+        run: Record = {"step [ms]": 1e3 * step, "time [ms/s]": None, **dict.fromkeys(ERRORS), "outcome": TIMED_OUT,
+                       "note": f"would take {seconds:.2g} s"}  # fmt: skip
+        if seconds <= longest:
+            found, seconds = timed(partial(_tried, way, scene, step))
+            if isinstance(found, Exception):
+                run |= {"outcome": FAILED, "note": " ".join(f"{type(found).__name__}: {found}".split())[:160]}
+            else:
+                motion, seconds = found
+                per_step = seconds / (scene.duration / step)
+                errors, note = judge.errors(motion) if motion.finite else ({}, "not a number")
+                run |= {**errors, "outcome": OK if motion.finite else FAILED, "note": note}
+        runs.append(run | {"time [ms/s]": 1e3 * seconds / scene.duration})
+    return runs
 
 
 def _tried(way: Motion, scene: FixedScene, step: float) -> tuple[Trajectory, float] | Exception:

@@ -67,9 +67,9 @@ def test_failures_and_time_outs_are_records(judge: Judge) -> None:
         return _true_motion(judge), 0.3 * 1e-3 / step, 0.0
 
     runs = over_steps(SCENE, way, judge, (1e-4, 1e-3, 1e-2), longest=1.0)
-    assert [(run["step"], run["outcome"]) for run in runs] == [(10.0, FAILED), (1.0, OK), (0.1, TIMED_OUT)]
-    assert "too coarse" in runs[0]["note"] and "position" not in runs[0]
-    assert runs[2]["time"] == pytest.approx(3000.0 / SCENE.duration) and "3 s" in runs[2]["note"]
+    assert [(run["step [ms]"], run["outcome"]) for run in runs] == [(10.0, FAILED), (1.0, OK), (0.1, TIMED_OUT)]
+    assert "too coarse" in runs[0]["note"] and runs[0]["position"] is None
+    assert runs[2]["time [ms/s]"] == pytest.approx(3000.0 / SCENE.duration) and "3 s" in runs[2]["note"]
 
 
 def test_a_disturbed_set_up_does_not_shorten_a_run(judge: Judge) -> None:
@@ -80,7 +80,7 @@ def test_a_disturbed_set_up_does_not_shorten_a_run(judge: Judge) -> None:
         return _true_motion(judge), *next(spent)
 
     [run] = over_steps(SCENE, way, judge, (1e-3,), longest=1.0)
-    assert run["time"] == pytest.approx(2.0 / SCENE.duration)
+    assert run["time [ms/s]"] == pytest.approx(2.0 / SCENE.duration)
 
 
 def test_impulses_meet_the_truth_better_with_every_step(judge: Judge) -> None:
