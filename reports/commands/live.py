@@ -17,8 +17,9 @@ from reference.worlds import find_world
 from reports.commands.answer import Json, print_json
 from reports.commands.run import Rendering, SceneName, Values, counted, duration, scene_given
 from reports.live.budget import calibrated
+from reports.live.deadline import Pace
+from reports.live.device import live_simulation
 from reports.live.loop import Loop
-from reports.live.measure import Pace, live_simulation
 from reports.live.replay import finish_live, open_log
 from reports.live.viewer import Viewer
 from reports.store.logs import RunLog

@@ -69,12 +69,6 @@ def body_placements(scene: Mapping[str, Any], pose: Floats | None = None) -> dic
             zip(scene["bodies"], turns.as_matrix(), origins, strict=True)}  # fmt: skip
 
 
-def held_point(scene: Mapping[str, Any], pose: Floats) -> Floats | None:
-    """Return the point (3,) [m] at which the hand holds the tool; None in a scene without a hand."""
-    hand = scene.get("hand")
-    return None if hand is None else body_placements(scene, pose)[hand["body"]].of(np.resize([*hand["point"], 0.0], 3))
-
-
 # In the plane
 
 

@@ -2,7 +2,8 @@
 
 Everybody who can open the page can move the hand. Therefore the server listens on this machine only. It answers a
 request only if the Host header names this machine and the address contains the random token; a web socket must also
-come from the server's own page (Origin header). Other websites in the same browser cannot meet these conditions.
+come from the server's own page (Origin header). Other websites in the same browser cannot meet these conditions; they
+can neither show the page in a frame nor learn its address from it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from reports.figures.canvas import is_turned
-from reports.figures.geometry import body_placements, extent, held_point, is_spatial, solids
+from reports.figures.geometry import extent, is_spatial, solids
 from reports.live.window import Window
 
 Floats = NDArray[np.float64]
@@ -37,39 +38,45 @@ _POLITENESS = 10  # niceness: the loop has priority
 _BODY, _TOOL, _WALL = (120, 144, 170), (214, 120, 60), (170, 170, 165)
 _DISTANCE = {False: 2.2, True: 1.4}  # of the camera, in sizes of a scene in the plane or in space
 _HANDLE_SIZE = 0.25  # of the handle, as a share of the scene's size
+_FAR = 1e6  # [m] a mouse is nowhere beyond this
+_HEADERS = {"X-Frame-Options": "DENY", "Referrer-Policy": "no-referrer"}
 
 
-def show_in_browser(name: str, numbers: int, scene: Mapping[str, Any], port: int, ready: Connection) -> None:
-    """Serve the scene (in the viewer's process) with poses from shared memory `name` until the loop's process ends."""
-    os.nice(_POLITENESS)
-    parent = os.getppid()
-    show(Window.opened(name, numbers), scene, port, ready, lambda: os.getppid() == parent)
+def show_in_browser(name: str, scene: Mapping[str, Any], port: int, ready: Connection) -> None:
+    """Serve the scene (in the viewer's process) with poses from shared memory `name` until the loop's process ends.
 
-
-def show(window: Window, scene: Mapping[str, Any], port: int, ready: Connection, wanted: Callable[[], bool]) -> None:
-    """Serve the scene while `wanted` returns True; send the address through `ready` once the server is running."""
+    The address is sent through `ready` once the server is running.
+    """
     import viser
 
+    os.nice(_POLITENESS)
+    parent, names = os.getppid(), [body["name"] for body in scene["bodies"]]
+    window = Window(7 * len(names), name)
     # A browser opens connections that it never uses; without this, each would print a traceback.
     logging.getLogger("websockets").setLevel(logging.CRITICAL)
     token = secrets.token_urlsafe(16)
     with _guarded(token), redirect_stdout(StringIO()):  # the loop's process prints the address
         server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
     server.gui.configure_theme(show_share_button=False)
-    frames = _draw(server, scene)
-    mouse = _Mouse(server, scene)
+    size, frames = _look(server, scene), [server.scene.add_frame(f"/{body}", show_axes=False) for body in names]
+    hand = scene.get("hand") or {}
+    for number, piece in enumerate(solids(scene)):
+        color = _WALL if not piece.body else _TOOL if piece.body == hand.get("body") else _BODY
+        server.scene.add_mesh_simple(f"/{piece.body or 'world'}/shape{number}", piece.vertices.astype(np.float32),
+                                     piece.faces.astype(np.uint32), color=color, flat_shading=True, side="double")
+    mouse = Mouse(server, _HANDLE_SIZE * size, is_spatial(scene)) if hand else None
     ready.send(f"http://{HOST}:{server.get_port()}/{token}/")
-    while wanted():
+    while os.getppid() == parent:
         started = time.monotonic()
         pose = window.shown()
         if pose is not None and np.all(np.isfinite(pose)):
-            pose = pose.reshape(len(scene["bodies"]), -1)
             with server.atomic():
-                for name, place in body_placements(scene, pose).items():
-                    frames[name].wxyz = Rotation.from_matrix(place.rotation).as_quat(scalar_first=True)
-                    frames[name].position = place.origin
-                mouse.follow(pose)
-        window.want(mouse.target_at(time.monotonic()), time.monotonic())
+                for frame, place in zip(frames, pose.reshape(-1, 7), strict=True):
+                    frame.position, frame.wxyz = place[:3], place[[6, 3, 4, 5]]
+                if mouse is not None:
+                    held = pose[7 * names.index(hand["body"]) :][:7]
+                    mouse.follow(held[:3] + Rotation.from_quat(held[3:]).apply(np.resize([*hand["point"], 0.0], 3)))
+        window.want(mouse and mouse.target_at(time.monotonic()), time.monotonic())
         time.sleep(max(0.0, started + 1.0 / FRAMES_PER_SECOND - time.monotonic()))
     server.stop()
 
@@ -94,7 +101,10 @@ def _guarded(token: str) -> Iterator[None]:
             if not allowed(request.path, request.headers, connection.local_address[1], token):
                 return connection.respond(HTTPStatus.FORBIDDEN, "the address that iapb live printed leads here\n")
             request.path = "/" + request.path.removeprefix(f"/{token}").lstrip("/")
-            return process_request(connection, request)
+            page = process_request(connection, request)
+            if page is not None:
+                page.headers.update(_HEADERS)
+            return page
 
         guarded.append(True)
         return serve(*arguments, process_request=answer, **options)
@@ -117,49 +127,31 @@ def allowed(path: str, headers: Any, port: int, token: str) -> bool:
             and hmac.compare_digest("".join(word).encode(), token.encode()))  # fmt: skip
 
 
-def _draw(server: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
-    """Add every shape below the frame of its body; return the frames."""
-    frames = {body["name"]: server.scene.add_frame(f"/{body['name']}", show_axes=False) for body in scene["bodies"]}
-    held = (scene.get("hand") or {}).get("body")
-    for number, piece in enumerate(solids(scene)):
-        color = _WALL if not piece.body else _TOOL if piece.body == held else _BODY
-        server.scene.add_mesh_simple(f"/{piece.body or 'world'}/shape{number}", piece.vertices.astype(np.float32),
-                                     piece.faces.astype(np.uint32), color=color, flat_shading=True, side="double")
-    _look(server, scene)
-    return frames
-
-
-def _look(server: Any, scene: Mapping[str, Any]) -> None:
-    """Set the camera: planar scenes from the front, scenes in space from the side; up is opposite to gravity."""
+def _look(server: Any, scene: Mapping[str, Any]) -> float:
+    """Set the camera, planar scenes from the front, others from the side, up against gravity; return the size [m]."""
     low, high = extent(scene)
-    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
-    up = np.array([0.0, -1.0, 0.0] if is_turned(scene) else [0.0, 1.0, 0.0])
-    towards = np.array([0.0, 0.0, 1.0])
-    if is_spatial(scene):
+    middle, size, spatial = 0.5 * (low + high), float(np.linalg.norm(high - low)), is_spatial(scene)
+    up, towards = np.array([0.0, -1.0 if is_turned(scene) else 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    if spatial:
         gravity = np.asarray(scene.get("gravity") or (0.0, 0.0, -1.0), dtype=float)
         up = -gravity / max(float(np.linalg.norm(gravity)), np.finfo(float).tiny)
         towards = np.array([0.62, -0.72, 0.31])
     camera = server.initial_camera
-    camera.up, camera.look_at, camera.position = up, middle, middle + _DISTANCE[is_spatial(scene)] * size * towards
+    camera.up, camera.look_at, camera.position = up, middle, middle + _DISTANCE[spatial] * size * towards
     camera.near = 0.01 * size
     server.scene.set_up_direction(up)
+    return size
 
 
-class _Mouse:
+class Mouse:
     """The handle: it follows the tool until the mouse drags it; then it is the target to which the tool is pulled."""
 
-    def __init__(self, server: Any, scene: Mapping[str, Any]) -> None:
+    def __init__(self, server: Any, size: float, spatial: bool) -> None:
         self.target: Floats | None = None
         self._moved_at = 0.0
-        self._scene, self._handle = scene, None
-        if scene.get("hand") is None:
-            return
-        low, high = extent(scene)
-        size = _HANDLE_SIZE * float(np.linalg.norm(high - low))
         self._handle = server.scene.add_transform_controls(
-            "/hand", scale=size, disable_rotations=True, active_axes=(True, True, is_spatial(scene)),
-            depth_test=False)
-        self._handle.on_update(self._moved)
+            "/hand", scale=size, disable_rotations=True, active_axes=(True, True, spatial), depth_test=False)
+        self._handle.on_update(self.moved)
         server.on_client_disconnect(self._gone)
 
     def target_at(self, now: float) -> Floats | None:
@@ -168,14 +160,19 @@ class _Mouse:
             self.target = None
         return self.target
 
-    def _moved(self, event: Any) -> None:
-        self._moved_at = time.monotonic()
-        self.target = None if event.phase == "end" else np.array(event.target.position, dtype=float)
+    def moved(self, event: Any) -> None:
+        """Take the place of the handle as the target; let go for a place that no mouse can reach."""
+        self._moved_at, place = time.monotonic(), np.array(event.target.position)
+        right = place.shape == (3,) and place.dtype.kind in "if" and bool(np.all(np.abs(place) <= _FAR))
+        self.target = place.astype(float) if right and event.phase != "end" else None
 
     def _gone(self, client: Any) -> None:
         self.target = None  # without a client the mouse holds nothing
 
-    def follow(self, pose: Floats) -> None:
-        """Move the handle to the held point of the tool, unless the mouse holds the handle."""
-        if self._handle is not None and self.target is None:
-            self._handle.position = held_point(self._scene, pose)
+    def follow(self, point: Floats) -> None:
+        """Move the handle to the held point (3,) of the tool, unless the mouse holds the handle."""
+        if self.target is None:
+            try:
+                self._handle.position = point
+            except (TypeError, ValueError):  # a client sent something else, which viser has kept
+                self._handle._impl.position = np.zeros(3)

@@ -7,8 +7,7 @@ estimated by its recent maximum. The budgets are recorded, so that a run can be 
 
 from __future__ import annotations
 
-import time
-from typing import NamedTuple
+import timeit
 
 import numpy as np
 
@@ -22,26 +21,19 @@ _REPEATS = 15
 _CHEAPEST_ROW = 1e-8  # [s] a few dozen operations; a smaller measured time per row is noise
 
 
-class RowCost(NamedTuple):
-    """The time of a step [s]: `fixed`, plus `per_row` for each row that an impact uses."""
-
-    fixed: float
-    per_row: float
-
-
 class RowBudget:
     """Converts the remaining time into a number of rows.
 
     Parameters
     ----------
-    cost : RowCost
+    fixed, per_row : float [s], the time of a step is `fixed`, plus `per_row` for each row that an impact uses.
     period : float [s]
     dofs : largest number of rows of an impact, because more rows cannot be independent.
     islands : largest number of impacts in a step; the rows are distributed evenly among them.
     """
 
-    def __init__(self, cost: RowCost, period: float, dofs: int, islands: int) -> None:
-        self.fixed, self.per_row = cost
+    def __init__(self, fixed: float, per_row: float, period: float, dofs: int, islands: int) -> None:
+        self.fixed, self.per_row = fixed, per_row
         self._reserve, self._dofs, self._islands = _RESERVE * period, dofs, max(islands, 1)
 
     def rows(self, left: float) -> int:
@@ -59,24 +51,14 @@ class RowBudget:
 
 def calibrated(simulation: Simulation, period: float) -> RowBudget:
     """Measure the time per row on this machine, in an impact of the largest size that is possible in the scene."""
-    dofs = simulation.system.mechanism.nv
-    count = int(np.clip(simulation.system.capacity, 1, _ROWS))
-    cost = RowCost(0.0, _seconds_per_row(dofs, count))
-    return RowBudget(cost, period, dofs, len(simulation.system.mechanism.tree_dofs))
-
-
-def _seconds_per_row(dofs: int, count: int) -> float:
-    """Return the time of an impact per additional row, from the fastest of some repetitions."""
-    random = np.random.default_rng(0)
+    mechanism, random = simulation.system.mechanism, np.random.default_rng(0)
+    dofs, count = mechanism.nv, int(np.clip(simulation.system.capacity, 1, _ROWS))
     rows, velocity = random.normal(size=(count, dofs)), random.normal(size=dofs)
-    budgets = np.unique([1, min(dofs, count)])
-    times = []
-    for budget in budgets:
-        taken = []
-        for _ in range(_REPEATS):
-            started = time.perf_counter()
-            resolve_impact(np.eye(dofs), rows, velocity, 0.0, budget=int(budget))
-            taken.append(time.perf_counter() - started)
-        times.append(min(taken))
-    slope = (times[-1] - times[0]) / max(budgets[-1] - budgets[0], 1)
-    return max(float(slope), _CHEAPEST_ROW)
+
+    def fastest(budget: int) -> float:
+        return min(timeit.repeat(lambda: resolve_impact(np.eye(dofs), rows, velocity, 0.0, budget=budget),
+                                 number=1, repeat=_REPEATS))
+
+    most = min(dofs, count)
+    slope = (fastest(most) - fastest(1)) / max(most - 1, 1)
+    return RowBudget(0.0, max(slope, _CHEAPEST_ROW), period, dofs, len(mechanism.tree_dofs))

@@ -10,25 +10,58 @@ To wait for an instant, the clock sleeps until shortly before it, and then polls
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.run import Run
+
 Floats = NDArray[np.float64]
-TICK_COLUMNS = 10
+# Columns of a timetable: name, unit, meaning.
+TICK = (
+    ("due", "s", "when the tick was due, since the first one"),
+    ("start", "s", "when it began, never before it was due"),
+    ("end", "s", "when its work was done"),
+    ("budget", "1", "rows that an impact of the step could use"),
+    *((f"{what}_{axis}", unit, f"of the hand, {what}_{axis}")
+      for what, unit in (("force", "N"), ("torque", "N m")) for axis in "xyz"),
+)
+TICK_COLUMNS = len(TICK)
 PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
 
 class Timetable(NamedTuple):
-    """The times of n ticks, in seconds since the first tick was due, with their row budgets and wrenches."""
+    """The ticks of a loop: `period` [s] and a row (n, TICK_COLUMNS) for each tick, with the columns of `TICK`."""
 
     period: float
-    due: Floats  # (n,)
-    start: Floats  # (n,) when the tick began, never before it was due
-    end: Floats  # (n,) when its work was done
-    budget: NDArray[np.int64]  # (n,) rows that an impact of the step could use
-    wrench: Floats  # (n, 6) of the hand [N, N m]
+    rows: Floats
+
+    @property
+    def due(self) -> Floats:
+        """Return when each tick (n,) was due [s]."""
+        return self.rows[:, 0]
+
+    @property
+    def start(self) -> Floats:
+        """Return when each tick (n,) began [s]."""
+        return self.rows[:, 1]
+
+    @property
+    def end(self) -> Floats:
+        """Return when the work of each tick (n,) was done [s]."""
+        return self.rows[:, 2]
+
+    @property
+    def budget(self) -> NDArray[np.int64]:
+        """Return how many rows an impact of each step (n,) could use."""
+        return self.rows[:, 3].astype(np.int64)
+
+    @property
+    def wrench(self) -> Floats:
+        """Return the wrench (n, 6) of the hand in each step [N, N m]."""
+        return self.rows[:, 4:]
 
     @property
     def work(self) -> Floats:
@@ -48,77 +81,63 @@ class Timetable(NamedTuple):
     @property
     def behind(self) -> float:
         """Return the total time [s] by which simulated time fell behind the clock."""
-        late = self.end - (self.due + self.period)
-        return float(late[self.missed].sum())
+        return float((self.end - (self.due + self.period))[self.missed].sum())
 
 
-class Deadlines:
-    """Records a timetable during the loop, without allocating memory.
+@dataclass(frozen=True)
+class Pace:
+    """How a live run kept its rate; times [s] at the percentiles of `PERCENTILES`."""
 
-    Parameters
-    ----------
-    period : float [s]
-    ticks : largest number of ticks.
-    first : float [s], clock time when the first tick is due.
-    kept : number of the last ticks that are kept; default: all.
-    """
-
-    def __init__(self, period: float, ticks: int, first: float, kept: int | None = None) -> None:
-        self.period, self.first, self.done = period, first, 0
-        self.due = first
-        self._rows = np.zeros((ticks if kept is None else kept, TICK_COLUMNS))
-
-    def left(self, now: float) -> float:
-        """Return the time [s] before the deadline of the current tick."""
-        return self.due + self.period - now
-
-    def note(self, budget: int, wrench: Floats) -> None:
-        """Record the inputs of the current step, so that it can be repeated."""
-        row = self._rows[self.done % len(self._rows)]
-        row[3], row[4:] = budget, wrench
-
-    def close(self, start: float, end: float) -> None:
-        """Record the times of a tick; the next one is due a period later or, after a missed deadline, at `end`."""
-        row = self._rows[self.done % len(self._rows)]
-        row[0], row[1], row[2] = self.due - self.first, start - self.first, end - self.first
-        self.done += 1
-        self.due = max(self.due + self.period, end)
-
-    def timetable(self, ticks: int) -> Timetable:
-        """Return the timetable of the first `ticks` ticks."""
-        return timetable_of(self.period, self.rows(0, ticks))
-
-    def rows(self, first: int, count: int) -> Floats:
-        """Return rows (count, TICK_COLUMNS) from tick number `first` on: due, start, end, row budget, wrench (6)."""
-        found: Floats = self._rows[np.arange(first, first + count) % len(self._rows)]
-        return found
+    scene: str
+    rate: float  # [1/s]
+    ticks: int
+    work: tuple[float, ...]  # of a tick
+    lateness: tuple[float, ...]  # of its beginning
+    missed: int
+    behind: float  # [s] that simulated time fell behind the clock
+    collisions: int
+    least_rows: int  # that the time left gave a collision
+    rows_left_out: int  # rows that still approached after impacts that had used up their budget
 
 
-def timetable_of(period: float, rows: Floats) -> Timetable:
-    """Return the timetable that rows of `Deadlines` describe."""
-    due, start, end, budget = rows[:, :4].T.copy()
-    return Timetable(period, due, start, end, budget.astype(np.int64), rows[:, 4:].copy())
+_EDGES = np.geomspace(1e-9, 1e5, 32_001)  # [s] of a histogram, relative distance 1e-3
 
 
-_EDGES = np.geomspace(1e-9, 1e5, 32_001)  # [s], relative distance 1e-3
-
-
-class Spread:
-    """A histogram of any number of times, in constant memory and with a relative resolution of 1e-3."""
+class Tally:
+    """Collects the numbers of a live run that is given in parts, in constant memory."""
 
     def __init__(self) -> None:
-        self._counts, self._worst = np.zeros(len(_EDGES) + 1, np.int64), 0.0
+        self._scene, self._period, self._ticks, self._behind = "", 1.0, 0, 0.0
+        self._counts, self._worst = np.zeros((2, len(_EDGES) + 1), np.int64), np.zeros(2)  # of work, of lateness
+        self._missed = self._collisions = self._left_out = 0
+        self._least = np.iinfo(np.int64).max
 
-    def add(self, seconds: Floats) -> None:
-        """Add times [s] to the histogram."""
-        self._counts += np.bincount(np.searchsorted(_EDGES, seconds), minlength=len(self._counts))
-        self._worst = max(self._worst, float(seconds.max(initial=0.0)))
+    def add(self, run: Run, table: Timetable) -> None:
+        """Add a part of the run and the ticks of this part."""
+        impacts = run.impacts
+        given = table.budget[impacts.step[:] - self._ticks]
+        short = (impacts.rank[:] >= given) & (given < run.v.shape[1])
+        self._left_out += int(impacts.approaching[:][short].clip(0).sum())
+        self._collisions += len(given)
+        self._least = int(given.min(initial=self._least))
+        self._scene, self._period, self._ticks = run.scene_name, table.period, self._ticks + len(table.rows)
+        for k, seconds in enumerate((table.work, table.lateness)):
+            self._counts[k] += np.bincount(np.searchsorted(_EDGES, seconds), minlength=len(_EDGES) + 1)
+            self._worst[k] = seconds.max(initial=self._worst[k])
+        self._missed += int(table.missed.sum())
+        self._behind += table.behind
 
-    def percentiles(self) -> tuple[float, ...]:
+    def pace(self) -> Pace:
+        """Return the numbers of all parts."""
+        return Pace(self._scene, 1.0 / self._period, self._ticks, self._percentiles(0), self._percentiles(1),
+                    self._missed, self._behind, self._collisions, self._least if self._collisions else 0,
+                    self._left_out)  # fmt: skip
+
+    def _percentiles(self, k: int) -> tuple[float, ...]:
         """Return the times [s] at `PERCENTILES`: upper ends of bins, except the last, which is the exact maximum."""
-        below = np.cumsum(self._counts)
-        bins = np.searchsorted(below, np.array(PERCENTILES) / 100.0 * below[-1])
-        return tuple(min(float(_EDGES[min(each, len(_EDGES) - 1)]), self._worst) for each in bins[:-1]) + (self._worst,)
+        below, worst = np.cumsum(self._counts[k]), float(self._worst[k])
+        bins = np.searchsorted(below, np.array(PERCENTILES[:-1]) / 100.0 * below[-1]).clip(max=len(_EDGES) - 1)
+        return (*np.minimum(_EDGES[bins], worst).tolist(), worst)
 
 
 # Linux wakes a sleeping process about 50 µs late, so the clock polls during the last part; more would waste power.
@@ -146,8 +165,6 @@ class MonotonicClock:
 
     def wait_until(self, instant: float) -> None:
         """Sleep to `SPIN_SECONDS` before the instant, then spin."""
-        asleep = instant - time.monotonic() - SPIN_SECONDS
-        if asleep > 0.0:
-            time.sleep(asleep)
+        time.sleep(max(0.0, instant - time.monotonic() - SPIN_SECONDS))
         while time.monotonic() < instant:
             pass

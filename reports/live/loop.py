@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import gc
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -23,11 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import IapbError, RunFileError
-from iapb.recording import Record, Recorder
+from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.simulation import INTERRUPTED, Simulation
 from reports.live.budget import RowBudget
-from reports.live.deadline import Clock, Deadlines, MonotonicClock, Timetable
+from reports.live.deadline import TICK_COLUMNS, Clock, MonotonicClock, Timetable
 from reports.store.logs import RunLog
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,6 @@ Floats = NDArray[np.float64]
 _SPARE_SECONDS = 4e-4  # [s] a chunk is allocated in advance only if this much of the period is left
 _LOG_SECONDS = 7e-4  # [s] a chunk is written if this much of the period is left
 _MOST_WAITING = 8  # or if more chunks than this are waiting
-_TICKS_KEPT = 16 * 512  # more than the ticks of the waiting chunks
 
 
 class Audience(Protocol):
@@ -74,10 +74,10 @@ class Loop:
 
     def __init__(self, simulation: Simulation, ticks: int, clock: Clock | None = None,
                  budget: RowBudget | None = None, audience: Audience | None = None, log: RunLog | None = None) -> None:
-        self.simulation, self.ticks, self.audience = simulation, ticks, audience
+        self.simulation, self.ticks, self.budget, self.audience = simulation, ticks, budget, audience
         self.clock: Clock = MonotonicClock() if clock is None else clock
-        self.budget, self._rows = budget, int(simulation.state.row_budget[0])
         self._tape = Tape(simulation, ticks, log)
+        self._first = self._due = 0.0  # when the first tick was due, and when the next one is
         self._under_way = False  # between the two halves of a step
         self._interrupted = False
 
@@ -89,57 +89,65 @@ class Loop:
         IapbError, KeyboardInterrupt
             The loop was stopped before its first step was complete.
         """
-        deadlines, stopped = self._paced(None)
-        timetable = deadlines.timetable(self._tape.steps)
-        return LiveRun(self._tape.run(world, stopped), timetable, name_of(self.simulation.link))
+        return self._tape.run(world, self._paced())
 
     def stream(self) -> str:
         """Run all ticks like `run`, but write them to the log; return why the loop stopped early, "" if it did not."""
-        _, stopped = self._paced(_TICKS_KEPT)
+        stopped = self._paced()
         try:
             self._tape.write_log(all_of_it=True)
         except RunFileError as error:
             return stopped or str(error)
         return stopped
 
-    def _paced(self, kept: int | None) -> tuple[Deadlines, str]:
-        """Run the ticks; return the timetable of the last `kept` ones, and why the loop stopped early."""
-        stopped, dt = "", self.simulation.system.dt
-        with self._until_interrupted(), _without_collector():
-            deadlines = self._tape.deadlines = Deadlines(dt, self.ticks, self.clock.now() + dt, kept)
+    def _paced(self) -> str:
+        """Run the ticks; return why the loop stopped early, "" if it did not."""
+        stopped, link = "", self.simulation.link
+        with self._undisturbed():
+            self._first = self._due = self.clock.now() + self.simulation.system.dt
             try:
-                while deadlines.done < self.ticks and not self._interrupted:
-                    self._tick(deadlines)
-                self.clock.wait_until(deadlines.due)
+                for _ in range(self.ticks):
+                    if self._interrupted:
+                        break
+                    self._tick()
+                self.clock.wait_until(self._due)
                 self._finish()
             except IapbError as error:
                 stopped = str(error)
             except Exception as error:  # a user's device may raise anything; finished steps are kept
                 stopped = f"the device failed: {type(error).__name__}: {error}"
-            self._release()
-        steps = self._tape.steps
-        if steps == 0:
+            if link is not None:
+                with suppress(Exception):  # the device may be the cause of the failure
+                    link.release()
+        if self._tape.steps == 0:
             raise IapbError(stopped) if stopped else KeyboardInterrupt
-        return deadlines, "" if steps == self.ticks else stopped or INTERRUPTED
+        return "" if self._tape.steps == self.ticks else stopped or INTERRUPTED
 
-    def _tick(self, deadlines: Deadlines) -> None:
-        self.clock.wait_until(deadlines.due)
+    def _tick(self) -> None:
+        simulation, tape, period = self.simulation, self._tape, self.simulation.system.dt
+        self.clock.wait_until(self._due)
         start = self.clock.now()
         self._finish()
-        self._give(deadlines)
-        self.simulation.begin_step()
+        tick, now = tape.tick(), self.clock.now()
+        if self.budget is not None:
+            simulation.state.row_budget[0] = self.budget.rows(self._due + period - now)
+        if self.audience is not None:
+            simulation.port.wrench[:] = self.audience.pull(now)
+        tick[3], tick[4:] = simulation.state.row_budget[0], simulation.port.wrench  # so that it can be repeated
+        simulation.begin_step()
         self._under_way = True
         if self.audience is not None:
-            self.audience.publish(self.simulation.state.q)
+            self.audience.publish(simulation.state.q)
         end = self.clock.now()
-        deadlines.close(start, end)
-        self._tape.add_time(end - start)
+        tick[0], tick[1], tick[2] = self._due - self._first, start - self._first, end - self._first
+        self._due = max(self._due + period, end)  # after a missed deadline: at once
         if self.budget is not None:
-            self.budget.learn(end - start, self._rows_used())
-        if self._tape.wants_spare and self.clock.now() + _SPARE_SECONDS < deadlines.due:
-            self._tape.make_spare()
-        elif self._tape.wants_log and self.clock.now() + _LOG_SECONDS < deadlines.due:
-            self._tape.write_log()
+            log = simulation.state.impacts
+            self.budget.learn(end - start, int(log.rank[: log.logged[0]].sum()))
+        if tape.wants_spare and self.clock.now() + _SPARE_SECONDS < self._due:
+            tape.make_spare()
+        elif tape.wants_log and self.clock.now() + _LOG_SECONDS < self._due:
+            tape.write_log()
 
     def _finish(self) -> None:
         """End the current step and record it."""
@@ -148,53 +156,23 @@ class Loop:
             self.simulation.end_step()
             self._tape.write()
 
-    def _give(self, deadlines: Deadlines) -> None:
-        """Set the row budget and the hand's wrench of the next step; record both, so that it can be repeated."""
-        simulation, now = self.simulation, self.clock.now()
-        if self.budget is not None:
-            self._rows = self.budget.rows(deadlines.left(now))
-            simulation.state.row_budget[0] = self._rows
-        if self.audience is not None:
-            simulation.port.wrench[:] = self.audience.pull(now)
-        deadlines.note(self._rows, simulation.port.wrench)
-
-    def _rows_used(self) -> int:
-        log = self.simulation.state.impacts
-        return int(log.rank[: log.logged[0]].sum()) if log.logged[0] else 0
-
-    def _release(self) -> None:
-        if self.simulation.link is not None:
-            with suppress(Exception):  # the device may be the cause of the failure
-                self.simulation.link.release()
-
     @contextmanager
-    def _until_interrupted(self) -> Iterator[None]:
-        """Let Ctrl-C end the loop after the current tick, so that every recorded step is complete."""
+    def _undisturbed(self) -> Iterator[None]:
+        """Keep the garbage collector off; let Ctrl-C end the loop after the current tick, so that steps are whole."""
         def stop(*_: Any) -> None:
             self._interrupted = True
 
-        try:
-            before = signal.signal(signal.SIGINT, stop)
-        except ValueError:  # not the main thread, which alone receives Ctrl-C
-            yield
-            return
+        main, collects = threading.current_thread() is threading.main_thread(), gc.isenabled()
+        before = signal.signal(signal.SIGINT, stop) if main else None  # the main thread alone receives Ctrl-C
+        gc.collect()
+        gc.disable()
         try:
             yield
         finally:
-            signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def _without_collector() -> Iterator[None]:
-    """Collect garbage before the loop, and switch the collector off during the loop."""
-    was_on = gc.isenabled()
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
+            if collects:
+                gc.enable()
+            if main:
+                signal.signal(signal.SIGINT, before)
 
 
 def name_of(link: Any) -> str:
@@ -203,78 +181,80 @@ def name_of(link: Any) -> str:
 
 
 class Tape:
-    """Records steps in chunks of a `Recorder`, and allocates the next chunk in advance when there is time.
+    """Records steps and their ticks in chunks, and allocates the next chunk in advance when there is time.
 
     Parameters
     ----------
     simulation : in its initial state.
     steps : largest number of steps.
-    log : receives the full chunks, with their ticks from `deadlines`; None: the recorder keeps them.
+    log : receives the full chunks; None: the tape keeps them.
     """
 
     def __init__(self, simulation: Simulation, steps: int, log: RunLog | None = None) -> None:
         self._simulation, self._total, self._log = simulation, steps, log
-        self._waiting: list[tuple[Record, int, float]] = []
-        self.deadlines: Deadlines | None = None
-        self._recorder = Recorder(simulation)
-        self._record, self._size = self._recorder.blank(steps)
+        self._recorder, self._held = Recorder(simulation), list[Floats]()  # the ticks of each chunk of the recorder
+        self._line = 0
+        self._spare: tuple[Any, Floats] | None = None
+        self._record, self._ticks = self._blank(steps)
         simulation.prepare(self._record, singly=True)
-        self._spare: tuple[Record, int] | None = None
-        self._line, self._seconds = 0, 0.0
+
+    def _blank(self, steps: int) -> tuple[Any, Floats]:
+        record, size = self._recorder.blank(steps)
+        return record, np.zeros((size, TICK_COLUMNS))
 
     @property
     def steps(self) -> int:
         """Return the number of recorded steps."""
         return self._recorder.steps + self._line
 
+    def tick(self) -> Floats:
+        """Return the row (TICK_COLUMNS,) for the tick of the step that begins now."""
+        if self._line == len(self._ticks):
+            self._keep()
+            self._record, self._ticks = self._spare or self._blank(self._total)
+            self._spare = None
+        row: Floats = self._ticks[self._line]
+        return row
+
     def write(self) -> None:
         """Record the step that the simulation has just ended."""
-        if self._line == self._size:
-            self._keep()
-            self._record, self._size = self._spare or self._recorder.blank(self._total)
-            self._spare = None
         self._simulation.write(self._record, self._line)
         self._line += 1
-
-    def add_time(self, seconds: float) -> None:
-        """Add the working time of a tick to the timings of the run."""
-        self._seconds += seconds
 
     @property
     def wants_spare(self) -> bool:
         """Return whether the next chunk should be allocated soon."""
-        return self._spare is None and 2 * self._line > self._size and self._recorder.steps + self._size < self._total
+        size = len(self._ticks)
+        return self._spare is None and 2 * self._line > size and self._recorder.steps + size < self._total
 
     def make_spare(self) -> None:
         """Allocate the next chunk. This takes some tenths of a millisecond; call it only if no tick is due then."""
-        self._spare = self._recorder.blank(self._total - self._size)
+        self._spare = self._blank(self._total - len(self._ticks))
 
-    def run(self, world: str, stopped: str) -> Run:
-        """Return everything recorded so far as a Run."""
+    def run(self, world: str, stopped: str) -> LiveRun:
+        """Return everything recorded so far."""
         self._keep()
-        return self._recorder.run(world, stopped)
+        timetable = Timetable(self._simulation.system.dt, np.concatenate(self._held))
+        return LiveRun(self._recorder.run(world, stopped), timetable, name_of(self._simulation.link))
 
     def _keep(self) -> None:
-        if self._log is None:
-            self._recorder.keep(self._record, self._line, self._seconds)
-        else:
-            self._waiting.append((self._record, self._line, self._seconds))
-            self._recorder.go_on(self._recorder.steps + self._line)
-        self._line, self._seconds = 0, 0.0
-        if len(self._waiting) > _MOST_WAITING:
+        ticks = self._ticks[: self._line]
+        self._recorder.keep(self._record, self._line, float((ticks[:, 2] - ticks[:, 1]).sum()))
+        self._held.append(ticks)
+        self._line = 0
+        if self.wants_log and len(self._held) > _MOST_WAITING:
             self.write_log()
 
     @property
     def wants_log(self) -> bool:
         """Return whether a full chunk is waiting to be written to the log."""
-        return bool(self._waiting)
+        return self._log is not None and bool(self._held)
 
     def write_log(self, *, all_of_it: bool = False) -> None:
         """Write the oldest waiting chunk to the log; with `all_of_it` all chunks, including the unfinished one."""
         if all_of_it:
             self._keep()
-        while self._waiting and self._log is not None and self.deadlines is not None:
-            record, lines, seconds = self._waiting.pop(0)
-            self._log.write_chunk(record, lines, seconds, (self.deadlines.rows(self._log.steps, lines),))
+        while self.wants_log:
+            self._log.write_chunk(*self._recorder.chunks.pop(0), (self._held.pop(0),))  # type: ignore[union-attr]
             if not all_of_it:
                 break

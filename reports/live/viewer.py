@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from iapb.errors import ArgumentError, IapbError
 from iapb.simulation import Simulation
 from reports.batches import starting_a_process
-from reports.figures.geometry import is_spatial
 from reports.live.browser import show_in_browser
 from reports.live.window import Window
 
@@ -25,6 +24,8 @@ Floats = NDArray[np.float64]
 
 _FREQUENCY = 2.0 * np.pi * 2.0  # [rad/s] of the tool on the spring: about as fast as an arm follows a target
 _ACCELERATION = 1.0  # [m/s²] that the largest force gives the tool, on top of holding it against gravity
+_START_SECONDS = 180.0  # that a browser's server may take to start, on a machine that is busy otherwise
+_END_SECONDS = 3.0
 
 
 class SpringHand:
@@ -39,19 +40,24 @@ class SpringHand:
     """
 
     def __init__(self, simulation: Simulation) -> None:
-        if simulation.system.tool_tree < 0:
+        self._simulation, self._port, system = simulation, simulation.port, simulation.system
+        if system.tool_tree < 0:
             raise ArgumentError("scene", simulation.scene.name, "a scene with a hand")
-        self._simulation, self._dt = simulation, simulation.system.dt
-        self._own = simulation.port.wrench.copy()
+        self._own = self._port.wrench.copy()
         self._planar = len(simulation.scene.hand.point) == 2  # type: ignore[union-attr]
-        mass = _effective_mass(simulation)
+        mechanism, q = system.mechanism, simulation.state.q
+        jacobian = mechanism.point_jacobian(q, self._port.hand_body, self.point())
+        mobility = jacobian @ np.linalg.solve(mechanism.mass_matrix(q), jacobian.T)
+        mass = 1.0 / float(np.linalg.eigvalsh(mobility)[-1])
         self.stiffness, self.damping = mass * _FREQUENCY**2, 2.0 * mass * _FREQUENCY
-        self.limit = mass * (_ACCELERATION + float(np.linalg.norm(simulation.system.gravity)))
+        self.limit = mass * (_ACCELERATION + float(np.linalg.norm(system.gravity)))
         self._last: Floats | None = None
 
     def point(self) -> Floats:
         """Return the point (3,) [m] at which the hand holds the tool."""
-        return _held_point(self._simulation)
+        rotations, positions = self._simulation.system.mechanism.placements(self._simulation.state.q)
+        held: Floats = positions[self._port.hand_body] + rotations[self._port.hand_body] @ self._port.hand_point
+        return held
 
     def wrench(self, target: Floats | None) -> Floats:
         """Return the wrench (6,) of the scene's hand, plus the spring's force if there is a target (3,) [m]."""
@@ -60,7 +66,7 @@ class SpringHand:
             self._last = None
             return wrench
         point = self.point()
-        velocity = 0.0 if self._last is None else (point - self._last) / self._dt
+        velocity = 0.0 if self._last is None else (point - self._last) / self._simulation.system.dt
         self._last = point
         force = self.stiffness * (target - point) - self.damping * velocity
         if self._planar:
@@ -68,25 +74,6 @@ class SpringHand:
         size = float(np.linalg.norm(force))
         wrench[:3] += force * min(1.0, self.limit / size) if size > 0.0 else 0.0
         return wrench
-
-
-def _held_point(simulation: Simulation) -> Floats:
-    held, arm = simulation.port.hand_body, simulation.port.hand_point
-    rotation, position = simulation.system.mechanism.placements(simulation.state.q)
-    found: Floats = position[held] + rotation[held] @ arm
-    return found
-
-
-def _effective_mass(simulation: Simulation) -> float:
-    """Return the smallest effective mass of the held point over all directions [kg]."""
-    mechanism, q, port = simulation.system.mechanism, simulation.state.q, simulation.port
-    jacobian = mechanism.point_jacobian(q, port.hand_body, _held_point(simulation))
-    mobility = jacobian @ np.linalg.solve(mechanism.mass_matrix(q), jacobian.T)
-    return 1.0 / float(np.linalg.eigvalsh(mobility)[-1])
-
-
-_START_SECONDS = 180.0  # that a browser's server may take to start, on a machine that is busy otherwise
-_END_SECONDS = 3.0
 
 
 class Viewer:
@@ -100,11 +87,10 @@ class Viewer:
 
     def __init__(self, simulation: Simulation, port: int = 8080) -> None:
         self._hand = SpringHand(simulation) if simulation.system.tool_tree >= 0 else None
-        self._own = simulation.port.wrench.copy()
+        self._own, self._mechanism = simulation.port.wrench.copy(), simulation.system.mechanism
         self._target: Floats | None = None
         self._scene, self._port = simulation.scene.resolved(), port
-        self._mechanism, self._planar = simulation.system.mechanism, not is_spatial(self._scene)
-        self.window = Window.made(self._pose(simulation.state.q).size)
+        self.window = Window(7 * len(self._scene["bodies"]))
         self.publish(simulation.state.q)
         self.process: Any = None
 
@@ -112,7 +98,7 @@ class Viewer:
         """Start the process and return its secret address; raise IapbError if the process does not start."""
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        arguments = (self.window.name, self.window.numbers, self._scene, self._port, theirs)
+        arguments = (self.window.name, self._scene, self._port, theirs)
         self.process = context.Process(target=show_in_browser, args=arguments, daemon=True, name="iapb viewer")
         with starting_a_process():  # Ctrl-C is the loop's, which then ends the viewer
             self.process.start()
@@ -127,10 +113,7 @@ class Viewer:
 
     def publish(self, q: Floats) -> None:
         """Write the poses at q to the shared memory."""
-        self.window.publish(self._pose(q))
-
-    def _pose(self, q: Floats) -> Floats:
-        return self._mechanism.poses(q[None], self._planar).ravel()
+        self.window.publish(self._mechanism.poses(q[None], planar=False).ravel())
 
     def pull(self, now: float) -> Floats:
         """Return the wrench (6,) of the hand: that of the scene, plus that of the mouse while it holds the handle."""

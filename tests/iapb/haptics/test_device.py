@@ -19,7 +19,7 @@ from iapb.run import FREE, RESTING
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.simulation import Simulation, simulate
 from iapb.system import System, coupling_of
-from reports.live.measure import simulated_device
+from reports.live.device import simulated_device
 
 DT = 1.0 / 512.0
 MASS = np.array([[2.0, 0.0, 0.1], [0.0, 2.0, 0.0], [0.1, 0.0, 0.5]])

@@ -6,7 +6,7 @@ import pytest
 
 from iapb.scene import find_scene, load_scene
 from reference.worlds import find_world
-from reports.live.measure import live_simulation
+from reports.live.device import live_simulation
 
 # A tilted peg near the corner, fast: a collision of several contacts within the first hundredths of a second.
 VALUES = {"bodies.peg.position": [0.0209, -0.0141, 0.08], "bodies.peg.velocity": [-0.3, 0.4, 0.0]}
@@ -35,7 +35,7 @@ def fake_clock():
     return FakeClock
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def peg():
     """Make a simulation: peg(device="", world="IAPB", **values)."""
     def made(device="", world="IAPB", **values):

@@ -11,6 +11,7 @@ import urllib.request
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
+import msgspec
 import numpy as np
 import pytest
 import viser
@@ -21,31 +22,22 @@ from reports.live import browser
 from reports.live.loop import Loop
 from reports.live.replay import replay
 from reports.live.viewer import SpringHand, Viewer
-from reports.live.window import SILENCE_SECONDS, Window
+from reports.live.window import SILENCE_SECONDS, WANTED, Window
 from reports.store.keys import content_hash
 
 TICKS = 60
 
 
 @pytest.fixture(scope="module")
-def module_peg():
-    from iapb.scene import find_scene, load_scene
-    from reference.worlds import find_world
-    from reports.live.measure import live_simulation
-
-    return lambda: live_simulation(load_scene(find_scene("peg_corner")), find_world("IAPB"), 1000.0)
-
-
-@pytest.fixture(scope="module")
-def viewer(module_peg):
-    shown = Viewer(module_peg(), port=18080)
+def viewer(peg):
+    shown = Viewer(peg(), port=18080)
     shown.address = shown.start()
     yield shown
     name = shown.window.name
     shown.stop()
     assert not shown.process.is_alive()
     with pytest.raises(FileNotFoundError):
-        Window.opened(name, 3)
+        Window(3, name)
 
 
 def paced(viewer, simulation, clock):
@@ -58,6 +50,7 @@ def test_it_serves_a_page_on_this_machine(viewer):
     assert viewer.address.startswith("http://127.0.0.1:")
     with urllib.request.urlopen(viewer.address, timeout=20) as page:
         assert page.status == 200 and b"<html" in page.read().lower()
+        assert page.headers["X-Frame-Options"] == "DENY" and page.headers["Referrer-Policy"] == "no-referrer"
 
 
 def status(address, **headers):
@@ -100,14 +93,44 @@ def test_no_other_website_opens_the_web_socket_that_moves_the_hand(viewer):
         assert not opened(wrong, own), wrong
 
 
-def test_the_hand_lets_go_of_a_mouse_that_does_not_move():
-    mouse = browser._Mouse.__new__(browser._Mouse)
-    now, moved = time.monotonic(), SimpleNamespace(phase="update", target=SimpleNamespace(position=(1.0, 2.0, 3.0)))
-    mouse._moved(moved)
-    assert mouse.target_at(now + 0.9 * browser.HOLD_SECONDS) is not None
-    assert mouse.target_at(now + 1.1 * browser.HOLD_SECONDS) is None and mouse.target is None
-    mouse._moved(moved)
-    assert mouse.target_at(now + 1.0) is not None
+@pytest.mark.parametrize("place", [(np.inf, 0.0, 0.0), (np.nan, 0.0, 0.0), (1e308, 0.0, 0.0), (1.0, 2.0), {"x": 1.0},
+                                   "far", None, (1.0, None, 2.0), (True, False, True)], ids=str)
+def test_a_drag_to_where_no_mouse_can_be_lets_go(place):
+    handle = SimpleNamespace(on_update=lambda moved: None, position=np.zeros(3))
+    server = SimpleNamespace(scene=SimpleNamespace(add_transform_controls=lambda *_, **__: handle),
+                             on_client_disconnect=lambda gone: None)
+    mouse = browser.Mouse(server, 1.0, spatial=True)
+
+    def dragged(to):
+        mouse.moved(SimpleNamespace(phase="update", target=SimpleNamespace(position=np.array(to))))
+        return mouse.target_at(time.monotonic())
+
+    assert dragged((1.0, 2, 3.0)).tolist() == [1.0, 2.0, 3.0] and dragged(place) is None
+    assert dragged((1.0, 2.0, 3.0)) is not None
+    assert mouse.target_at(time.monotonic() + 0.9 * browser.HOLD_SECONDS) is not None
+    assert mouse.target_at(time.monotonic() + 1.1 * browser.HOLD_SECONDS) is None and mouse.target is None
+
+
+@pytest.mark.parametrize("nonsense", [(np.inf, 0.0, 0.0), (1e308, 0.0, 0.0), (1.0, 2.0), {"x": 1.0},
+                                      {"x": 1.0, "y": 0.0, "z": 0.0}], ids=str)
+def test_a_client_that_sends_nonsense_ends_neither_viewer_nor_hand(viewer, nonsense):
+    place, frames = urlsplit(viewer.address), 3 / browser.FRAMES_PER_SECOND
+    options = {"origin": f"http://{place.netloc}", "subprotocols": [f"viser-v{viser.__version__}"]}
+
+    def send(position, held):
+        message = {"type": "TransformControlsUpdateMessage", "name": "/hand", "wxyz": (1.0, 0.0, 0.0, 0.0)}
+        socket.send(msgspec.msgpack.encode(message | {"position": position}))
+        end = time.monotonic() + 20.0
+        while (viewer.window.target(time.monotonic(), None) is not None) is not held:
+            assert time.monotonic() < end
+            time.sleep(0.02)
+
+    for _ in range(2):
+        with connect(viewer.address.replace("http:", "ws:").rstrip("/"), **options) as socket:
+            send((0.01, -0.02, 0.0), held=True)
+            send(nonsense, held=False)
+            time.sleep(frames)
+    assert viewer.process.is_alive()
 
 
 def test_a_viser_that_starts_its_server_in_another_way_is_refused():
@@ -115,8 +138,8 @@ def test_a_viser_that_starts_its_server_in_another_way_is_refused():
         pass
 
 
-def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_its_end(module_peg, capfd):
-    shown = Viewer(module_peg(), port=18090)
+def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_its_end(peg, capfd):
+    shown = Viewer(peg(), port=18090)
     address = shown.start()
     port = urlsplit(address).port
     for sent in (b"", b"neither HTTP nor a web socket\r\n\r\n"):
@@ -134,30 +157,30 @@ def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_
 
 
 def test_the_loop_does_not_wait_for_a_viewer_that_sleeps_and_lets_go_for_one_that_is_silent(
-    viewer, module_peg, fake_clock
+    viewer, peg, fake_clock
 ):
     os.kill(viewer.process.pid, signal.SIGSTOP)
     try:
         target = np.array([0.0, -0.013, 0.0])
-        viewer.window._sequence[1] = 0  # it may have been stopped while writing
+        viewer.window.page[WANTED] = 0  # it may have been stopped while writing
         viewer.window.want(target, 100.0)  # in the sleeper's place: the mouse pulls the peg to the wall
         clock = fake_clock()
-        pulled = paced(viewer, module_peg(), clock)
+        pulled = paced(viewer, peg(), clock)
         assert pulled.run.steps == TICKS and not pulled.timetable.missed.any()
-        assert np.all(pulled.timetable.wrench[:, 0] < module_peg().scene.hand.force[0])
+        assert np.all(pulled.timetable.wrench[:, 0] < peg().scene.hand.force[0])
         assert content_hash(replay(pulled)) == content_hash(pulled.run)
         clock = fake_clock()
         clock.time += 2.0 * SILENCE_SECONDS
-        alone = paced(viewer, module_peg(), clock)
+        alone = paced(viewer, peg(), clock)
         assert np.array_equal(alone.timetable.wrench, np.tile(alone.timetable.wrench[0], (TICKS, 1)))
         assert np.any(alone.timetable.wrench != pulled.timetable.wrench)
-        assert np.array_equal(viewer.window.shown(), alone.run.pose[-1].ravel())
+        assert viewer.window.shown()[:2] == pytest.approx(alone.run.pose[-1, 0, :2], abs=0.0)
     finally:
         os.kill(viewer.process.pid, signal.SIGCONT)
 
 
-def test_the_loop_does_not_notice_that_the_viewer_has_died(viewer, module_peg, fake_clock):
+def test_the_loop_does_not_notice_that_the_viewer_has_died(viewer, peg, fake_clock):
     os.kill(viewer.process.pid, signal.SIGKILL)
     viewer.process.join(10.0)
-    live = paced(viewer, module_peg(), fake_clock())
+    live = paced(viewer, peg(), fake_clock())
     assert live.run.complete and not live.timetable.missed.any()

@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 
-from reports.live.window import SILENCE_SECONDS, Window
+from reports.live.window import SHOWN, SILENCE_SECONDS, TARGET, WANTED, Window
 
 NOW = 5.0
 
@@ -15,8 +15,8 @@ NOW = 5.0
 @pytest.fixture
 def sides():
     """The loop's side and the viewer's."""
-    ours = Window.made(4)
-    theirs = Window.opened(ours.name, 4)
+    ours = Window(4)
+    theirs = Window(4, ours.name)
     yield ours, theirs
     theirs.close()
     ours.close()
@@ -59,13 +59,13 @@ def test_a_viewer_that_died_while_writing_is_not_waited_for(sides):
     ours, theirs = sides
     theirs.want(np.array([0.1, 0.2, 0.3]), NOW)
     before = ours.target(NOW, None)
-    theirs._sequence[1] += 1  # it begins to write, and that was that
-    theirs._wishes[2:5] = 9.0
+    theirs.page[WANTED] += 1  # it begins to write, and that was that
+    theirs.page[TARGET] = 9.0
     assert ours.target(NOW, before) is before
     assert ours.target(NOW + 1.01 * SILENCE_SECONDS, before) is None  # the hand lets go
 
 
 def test_a_loop_that_died_while_writing_is_not_waited_for(sides):
     ours, theirs = sides
-    ours._sequence[0] += 1
+    ours.page[SHOWN] += 1
     assert theirs.shown() is None

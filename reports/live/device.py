@@ -1,0 +1,80 @@
+"""Prepare a scene for a live run: its rate, its world, and its device."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from iapb.errors import ArgumentError, IapbError
+from iapb.haptics.device import Device, SimulatedDevice
+from iapb.scene import Scene
+from iapb.simulation import Simulation
+from iapb.system import System
+from reference.worlds import World
+from reports.by_name import function_named
+
+
+def live_simulation(scene: Scene, world: World, rate: float, device: str = "") -> Simulation:
+    """Return a simulation whose step is the period of the rate, so that simulated time is real time.
+
+    Parameters
+    ----------
+    scene : Scene; its own rate is replaced.
+    world : law and coupling, see `reference.worlds`.
+    rate : float [1/s]
+    device : ``module:factory`` of a user's device, ``simulated``, or empty for the compiled device.
+    """
+    scene = scene.with_values({"rate": rate})
+    made = made_device(device, scene)
+    try:
+        return Simulation(scene, world.law, world.coupling_in(scene), made)
+    except IapbError:
+        raise
+    except Exception as error:
+        if made is None:
+            raise
+        raise IapbError(f"the device failed at its first reading: {type(error).__name__}: {error}") from error
+
+
+def made_device(name: str, scene: Scene) -> Device | None:
+    """Return the device that ``module:factory`` makes for a scene; None for an empty name.
+
+    Raises
+    ------
+    ArgumentError
+        There is no such factory, or it does not return a device.
+    """
+    if not name:
+        return None
+    make = simulated_device if name == "simulated" else function_named(
+        "--device", name, "module:factory, such as my_lab.omega:connect, or simulated")  # fmt: skip
+    try:
+        device: Device = make(scene)
+    except IapbError:
+        raise
+    except Exception as error:  # a device of somebody's own
+        why = f"{type(error).__name__}: {error}"
+        raise ArgumentError("--device", name, f"a factory that makes a device of a scene ({why})") from error
+    return device
+
+
+def simulated_device(scene: Scene) -> SimulatedDevice:
+    """Return the Python version of a scene's compiled device: its inertia, damping, delay, sensors and limits.
+
+    Raises
+    ------
+    ArgumentError
+        The scene has no hand, or the tool's mass matrix is not constant, which only the compiled device supports.
+    """
+    system = System(scene)
+    if system.tool_tree < 0:
+        raise ArgumentError("scene", scene.name, "a scene with a hand")
+    tool, state = system.device_mechanism(), system.make_state()
+    q, v = state.q[slice(*system.tool_coordinates)], state.v[slice(*system.tool_dofs)]
+    if not tool.has_constant_mass_matrix or len(q) != len(v):
+        raise ArgumentError("scene", scene.name, "a tool of constant inertia, with as many velocities as coordinates")
+    given = scene.device
+    settings: dict[str, Any] = {} if given is None else {
+        "damping": given.damping, "force_limit": given.force_limit, "delay": given.delay,
+        "resolution": given.position_resolution,
+    }  # fmt: skip
+    return SimulatedDevice(tool.mass_matrix(q), q, v, dt=system.dt, **settings)
