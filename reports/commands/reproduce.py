@@ -27,7 +27,7 @@ from reports.figures.standalone import standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, figure_inputs
 from reports.pages.quantities import contradictions, unsaid
-from reports.pages.records import FailedCases
+from reports.pages.records import Evidence, FailedCases
 from reports.report import write_report
 from reports.runner import Runner
 from verification.finding import Failure
@@ -77,18 +77,18 @@ def make_report(out: Path, depth: str, facts: dict[str, Any]) -> None:
     print(f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.")
     facts.update(page=path, beside=beside, files=files, seconds=took,
                  answers={topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics})
-    facts["contradictions"] = print_contradictions(pages)
+    facts["contradictions"] = print_contradictions(evidence)
     _end_where_something_failed(failed, facts)
-    facts["unsaid"] = unsaid(pages)
+    facts["unsaid"] = unsaid(evidence)
     if facts["unsaid"]:
         print(f"No page of the report says: {', '.join(facts['unsaid'])}.")
     if facts["contradictions"] or facts["unsaid"]:
         raise typer.Exit(1)
 
 
-def print_contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Print and return the quantities for which the pages give more than one value or verdict."""
-    found = contradictions(pages)
+def print_contradictions(evidence: Evidence) -> dict[str, tuple[str, ...]]:
+    """Print and return the quantities for which the report gives more than one value or verdict."""
+    found = contradictions(evidence)
     for name, texts in found.items():
         print(f"More than one value in the report. {name}: {', '.join(texts)}.")
     return found

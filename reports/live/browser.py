@@ -76,7 +76,7 @@ def show_in_browser(name: str, scene: Mapping[str, Any], port: int, ready: Conne
                 if mouse is not None:
                     held = pose[7 * names.index(hand["body"]) :][:7]
                     mouse.follow(held[:3] + Rotation.from_quat(held[3:]).apply(np.resize([*hand["point"], 0.0], 3)))
-        window.want(mouse and mouse.target_at(time.monotonic()), time.monotonic())
+        window.want(None if mouse is None else mouse.target_at(time.monotonic()), time.monotonic())
         time.sleep(max(0.0, started + 1.0 / FRAMES_PER_SECOND - time.monotonic()))
     server.stop()
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
 from itertools import groupby
 from posixpath import dirname, relpath
 from typing import Any
@@ -18,9 +21,7 @@ from reports.figures.numbers import format_cell, format_number, is_number
 from reports.figures.standalone import swatch
 from reports.pages.first import answer, facts
 from reports.pages.formulas import formula, prose
-from reports.pages.inline import policy, script
 from reports.pages.matrix import matrices, worst_first
-from reports.pages.quantities import judged, marks
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import explained
@@ -36,33 +37,27 @@ ROWS_SHOWN = 200
 OUTCOME_MARKS = dict(zip(VERDICTS, ("✓", "◐", "≈", "✕", "○", "…"), strict=True))
 OUTCOME_CLASSES = dict(zip(VERDICTS, ("good", "where", "limited", "bad", "open", "absent"), strict=True))
 # The words for the same outcomes of a check that is not a claim of the paper.
-FINDINGS = dict(
-    zip(VERDICTS, ("holds", "holds where stated", "mixed", "fails", "cannot tell", "not computed"), strict=True)
-)
+_WORDS = ("holds", "holds where stated", "mixed", "fails", "cannot tell", "not computed")
+FINDINGS = dict(zip(VERDICTS, _WORDS, strict=True))
 
 
 def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dict[str, str]:
-    """Return the report: the HTML of the first page and of each section, by file name.
+    """Return the HTML of the first page and of each section by file name, FIRST_PAGE first.
 
-    Parameters
-    ----------
-    evidence
-        The evidence to show; missing evidence is printed as "not computed in this run".
-    recipes
-        The recipes of the figures; by default all figures of the project.
-
-    Returns
-    -------
-    dict
-        FIRST_PAGE is the first key. Every page links to the others and needs neither network nor script.
+    Missing evidence is printed as "not computed in this run". Every page links to the others and needs neither network
+    nor script.
     """
     inputs = figure_inputs(evidence)
     figures: dict[str, list[Figure | NotComputed]] = {}
     for recipe in recipes:
         figures.setdefault(recipe.section, []).append(draw(recipe, inputs))
-    environment, text = _environment(), script()
+    environment = _environment()
+    text = "(() => {\n\"use strict\";\n" + files(__package__).joinpath("scripts/page.js").read_text("utf-8") + "})();\n"
+    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+    # The browser runs only this script and makes no requests; without the script the page is complete.
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
     shared = {
-        "script": text, "policy": policy(text), "played": played(figures), "evidence": evidence, "figures": figures,
+        "script": Markup(text), "policy": policy, "played": played(figures), "evidence": evidence, "figures": figures,
         "groups": [(group, list(found)) for group, found in groupby(SECTIONS, key=lambda section: section.group)],
         "used": {user for entry in evidence.manifest for user in entry.used_by},
     }  # fmt: skip
@@ -155,9 +150,8 @@ def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, s
 
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
-    failing = sum(part.verdict == REFUTED for part in topic.parts)
-    counted = failing and len(topic.parts) > 1
-    return f"{failing} of {len(topic.parts)} findings fail" if counted else FINDINGS[topic.verdict]
+    failing, total = sum(part.verdict == REFUTED for part in topic.parts), len(topic.parts)
+    return f"{failing} of {total} findings fail" if failing and total > 1 else FINDINGS[topic.verdict]
 
 
 def counted(part: Part) -> str:
@@ -187,7 +181,7 @@ def _environment() -> Environment:
         cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
         as_finding=FINDINGS.__getitem__, badge_words=badge_words, counted=counted, tables_without=tables_without,
-        runs_by_user=runs_by_user, anchor=anchor, marks=marks, judged=judged,
+        runs_by_user=runs_by_user, anchor=anchor,
         matrices=matrices, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals["rows_shown"] = ROWS_SHOWN

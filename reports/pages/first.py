@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import degrees
 from statistics import median
 
-from reports.pages.quantities import Mark, marks
+from reports.pages.quantities import PEG_STEP, peg_step
 from reports.pages.records import Evidence
 from verification.claims.peg import LARGE
 from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
@@ -23,12 +23,11 @@ LIMIT = "This does not hold for springs and time stepping: see what we miss."
 MISSES_SHOWN = 5
 # Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
 GRAVEST = ("exact-energy", "hard-cases", "engines", "scene-ledger", "complementarity", "stability", "mechanics")
-PEG_STEP = "peg_corner"  # the scene whose time of a step is shown
 
 
 @dataclass(frozen=True)
 class Fact:
-    """A line beside the answer; `id` links to its details in the report, `marks` are the quantities in it.
+    """A line beside the answer; `id` links to its details in the report.
 
     items : lines of a list, each with the id of its details
     """
@@ -36,7 +35,6 @@ class Fact:
     label: str
     text: str
     id: str
-    marks: tuple[Mark, ...] = ()
     items: tuple[tuple[str, str], ...] = ()
 
 
@@ -90,11 +88,11 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     topics = {topic.key: topic for topic in evidence.topics if topic.computed}
     found = []
     if (energy := topics.get("exact-energy")) is not None:
-        found.append(Fact("Is it safe?", f"{energy.answer} {LIMIT}", energy.key, marks(energy)))
+        found.append(Fact("Is it safe?", f"{energy.answer} {LIMIT}", energy.key))
     if (rate := topics.get("haptic-rate")) is not None:
-        step = _step(evidence)
-        said = f"A step of {PEG_STEP} takes {step.value}. " if step else ""
-        found.append(Fact("Is it fast?", said + rate.answer, rate.key, (*([step] if step else ()), *marks(rate))))
+        step = peg_step(evidence)
+        said = f"A step of {PEG_STEP} takes {step}. " if step else ""
+        found.append(Fact("Is it fast?", said + rate.answer, rate.key))
     if evidence.claims:
         found.append(Fact("Errors in the paper", ERRATA, "claims"))
     if any(topic.answer for topic in evidence.topics):
@@ -105,13 +103,6 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     if made:
         found.append(Fact("Made from", ", ".join(made), "provenance"))
     return tuple(found)
-
-
-def _step(evidence: Evidence) -> Mark | None:
-    """Return the time of a step of the representative scene."""
-    table = evidence.inputs.get("effect_steps")
-    times = table.where(scene=PEG_STEP).column("step") if table is not None and table.rows else []
-    return Mark("time of a peg step", f"{times[0]:.2g} µs") if times else None
 
 
 def _misses(topics: tuple[Finding, ...]) -> Fact:

@@ -6,8 +6,6 @@ import re
 
 from markupsafe import Markup, escape
 
-from reports.pages.quantities import Mark, marked
-
 _INLINE = re.compile(r"\$([^$]+)\$")
 _REFERENCE = re.compile(r"&#x([0-9A-Fa-f]+);")
 _GROUP_OF_ONE = re.compile(r"<mrow>(<(m[ion])>[^<]*</\2>)</mrow>")
@@ -29,21 +27,16 @@ def _shortened(mathml: str) -> str:
     return text.replace('<mspace width="0.167em" />', '<mspace width=".17em"/>')
 
 
-def prose(text: str, marks: tuple[Mark, ...] = ()) -> Markup:
-    """Return text with its ``$...$`` formulas as MathML, powers of ten as 10ⁿ, and the rest escaped.
-
-    marks : the quantities in the text
-    """
-    pieces = _INLINE.split(text)
+def prose(text: str) -> Markup:
+    """Return text with its ``$...$`` formulas as MathML, powers of ten as 10ⁿ, and the rest escaped."""
     return Markup("").join(
-        formula(piece, "inline") if number % 2 else _powers(piece, marks) for number, piece in enumerate(pieces)
-    )
+        formula(piece, "inline") if k % 2 else _powers(piece) for k, piece in enumerate(_INLINE.split(text)))
 
 
-def _powers(text: str, marks: tuple[Mark, ...]) -> Markup:
+def _powers(text: str) -> Markup:
     """Return escaped text in which 2.0e-16 becomes 2.0 · 10⁻¹⁶, -1 gets a true minus sign, and >= becomes ≥."""
-    signs = text.replace(">=", "≥").replace("<=", "≤")
-    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, marked(str(escape(signs)), marks))))
+    signs = str(escape(text.replace(">=", "≥").replace("<=", "≤")))
+    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, signs)))
 
 
 def _power(match: re.Match[str]) -> str:

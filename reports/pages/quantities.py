@@ -1,70 +1,48 @@
-"""Quantities that several pages quote. They are marked in the HTML, to check that value and verdict agree everywhere.
+"""Quantities that several pages quote: one value and one verdict each, compared on the findings before rendering.
 
-A Part or Finding names the quantities in its sentence; nothing here recognises words. The verdicts of findings and of
-their parts, which also appear on several pages, are marked in the same way.
+A Part or Finding names the quantities in its sentence, and its sentence contains their values (`verification.finding`);
+nothing here recognises words.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from typing import NamedTuple
+from reports.pages.records import Evidence
+from verification.finding import QUANTITIES, Finding, Part
 
-from markupsafe import Markup, escape
-
-from verification.finding import QUANTITIES, Finding, Part, said_as
-
-_MARKED = re.compile(r'<data value="([^"]+)"(?: data-verdict="([^"]*)")?>([^<]*)</data>')
-_JUDGED = re.compile(r'data-of="([^"]+)" data-verdict="([^"]+)"')
+PEG_STEP = "peg_corner"  # the scene whose time of a step is shown
 
 
-class Mark(NamedTuple):
-    """A quantity in a sentence: its name, its value as written there, and its verdict ("" without a verdict)."""
+def peg_step(evidence: Evidence) -> str:
+    """Return the time of a step of the representative scene, "" if it was not measured."""
+    table = evidence.inputs.get("effect_steps")
+    times = table.where(scene=PEG_STEP).column("step") if table is not None and table.rows else []
+    return f"{times[0]:.2g} µs" if times else ""
 
-    name: str
-    value: str
-    verdict: str = ""
 
+def quoted(evidence: Evidence) -> dict[str, set[str]]:
+    """Return all values of each quantity that the report quotes and, below ``verdict on NAME``, all its verdicts.
 
-def marks(said: Part | Finding) -> tuple[Mark, ...]:
-    """Return the quantities to mark in the sentence of a part, or in the answer of a finding.
-
-    In the sentence of a part, the verdict is that of the part. In an answer, it is the verdict of the part that has the
-    quantity, or that of the finding if no part has it.
+    The verdict on a quantity in a sentence of a part is that of the part. In an answer, it is the verdict of the part
+    that has the quantity, or that of the finding if no part has it.
     """
-    if isinstance(said, Part):
-        return tuple(Mark(name, value, said.verdict) for name, value in said.quantities)
-    judged = {name: part.verdict for part in said.parts for name, _ in part.quantities}
-    return tuple(Mark(name, value, judged.get(name, said.verdict)) for name, value in said.quantities)
+    said: dict[str, set[str]] = {"time of a peg step": {step}} if (step := peg_step(evidence)) else {}
+    for finding in (*evidence.claims, *evidence.topics):
+        judged = {name for part in finding.parts for name, _ in part.quantities}
+        sentences: tuple[Finding | Part, ...] = (finding, *finding.parts)
+        for one in sentences:
+            for name, value in one.quantities:
+                said.setdefault(name, set()).add(value)
+                if one is not finding or name not in judged:
+                    said.setdefault(f"verdict on {name}", set()).add(one.verdict)
+    return said
 
 
-def marked(text: str, given: tuple[Mark, ...]) -> str:
-    """Return escaped text with marks such as ``<data value="impacts certified" data-verdict="mixed">12</data>``."""
-    for name, value, verdict in given:
-        verdict = f' data-verdict="{verdict}"' if verdict else ""
-        text = said_as(str(escape(value))).sub(rf'<data value="{name}"{verdict}>\g<0></data>', text)
-    return text
+def contradictions(evidence: Evidence) -> dict[str, tuple[str, ...]]:
+    """Return the quantities for which the report gives different values or verdicts, with all of these."""
+    return {name: tuple(sorted(texts)) for name, texts in quoted(evidence).items() if len(texts) > 1}
 
 
-def judged(key: str, verdict: str) -> Markup:
-    """Return the HTML attributes that state which verdict an element shows, and of what."""
-    return Markup('data-of="{}" data-verdict="{}"').format(key, verdict)
-
-
-def contradictions(pages: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Return the quantities for which the pages give different values or verdicts, with all of these."""
-    said: dict[str, set[str]] = {}
-    for page in pages.values():
-        for name, verdict, text in _MARKED.findall(page):
-            said.setdefault(name, set()).add(" ".join(text.split()))
-            if verdict:
-                said.setdefault(f"verdict on {name}", set()).add(verdict)
-        for name, verdict in _JUDGED.findall(page):
-            said.setdefault(f"verdict on {name}", set()).add(verdict)
-    return {name: tuple(sorted(texts)) for name, texts in said.items() if len(texts) > 1}
-
-
-def unsaid(pages: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the quantities that appear on no page, so that `contradictions` does not check them."""
-    said = {name for page in pages.values() for name, _, _ in _MARKED.findall(page)}
+def unsaid(evidence: Evidence) -> tuple[str, ...]:
+    """Return the quantities that the report does not quote, so that `contradictions` does not check them."""
+    said = quoted(evidence)
     return tuple(name for name in QUANTITIES if name not in said)

@@ -35,7 +35,7 @@ def fake_clock():
     return FakeClock
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def peg():
     """Make a simulation: peg(device="", world="IAPB", **values)."""
     def made(device="", world="IAPB", **values):
