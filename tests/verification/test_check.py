@@ -45,7 +45,7 @@ def test_a_case_that_raises_costs_its_row_alone():
 def test_a_sentence_or_a_check_that_raises_costs_itself_alone():
     found = concluded(a_check(cases=("a",), says=lambda table: table.nothing), a_check("second", cases=None),
                       a_check("third", cases=("ccc",)), says=lambda tables, parts: tables["second"])  # fmt: skip
-    assert [one.case for one in found.failures] == ["sizes, its sentence", "second, all of it", "the answer"]
+    assert [one.case for one in found.failures] == ["second, all of it", "sizes, its sentence", "the answer"]
     assert {"sizes", "third"} <= set(found.tables) and "second" not in found.tables
     assert [part.verdict for part in found.parts] == [REFUTED, NOT_COMPUTED] and found.answer == "3 cases failed."
 

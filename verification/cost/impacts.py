@@ -72,7 +72,6 @@ WAYS: tuple[Way, ...] = (
     Way(PRINTED, "as printed", PYTHON, printed_call),
     Way(QP, "active set", PYTHON, daqp_call),
 )
-METHODS = tuple(dict.fromkeys(way.method for way in WAYS))
 SIZES = ((1, 3), (4, 3), (20, 6), (60, 12), (300, 30), (1000, 30))  # (contacts, coordinates)
 ROUNDS = 5
 LONGEST = 1e-2  # [s] largest time of a call: a slower method is timed once and skips all further impacts

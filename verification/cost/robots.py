@@ -26,7 +26,6 @@ ONE, MANY = "one state per call", f"{STATES} states in one call"
 LIMITS = {ONE: 3.0, MANY: 1.0}  # target of the ratio
 OTHERS = robot_files()[0]
 FILES = {path.stem: path for path in OTHERS or sorted((SHIPPED / "robots").glob("*.urdf"))}
-WHOSE = "robots of other projects" if OTHERS else "the project's own robots"
 
 
 def time_robot(study: Study, name: str) -> Iterator[Row]:
@@ -72,5 +71,6 @@ def _robots_say(table: Table) -> Iterator[Part]:
 
 ROBOTS = Check(
     key="robots", question="How long do M and B take, compared with Pinocchio?", cases=lambda _: FILES, row=time_robot,
-    says=_robots_say, timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"), digits=3, note=WHOSE,
+    says=_robots_say, timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"), digits=3,
+    note="robots of other projects" if OTHERS else "the project's own robots",
 )  # fmt: skip
