@@ -11,7 +11,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from itertools import islice
@@ -69,20 +69,19 @@ def processes(workers: int) -> Scheduler:
     """Compute in `workers` processes of this machine; results come in the order in which they finish."""
 
     def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
-        left = iter(parts)
         with worker_pool(workers) as pool:
-
-            def begin(count: int) -> dict[Future[Any], Any]:
-                return {pool.submit(compute, part): part for part in islice(left, count)}
-
-            running = begin(workers * _AHEAD)
-            while running:
-                finished, _ = wait(running, return_when=FIRST_COMPLETED)
-                running |= begin(len(finished))
-                for future in finished:
-                    yield running.pop(future), future.result()
+            yield from _as_they_finish(pool, compute, parts, workers * _AHEAD)
 
     return schedule
+
+
+def _as_they_finish(
+    pool: Executor, compute: Callable[[Any], Any], parts: Iterable[Any], ahead: int
+) -> Generator[tuple[Any, Any]]:
+    left, running = iter(parts), dict[Future[Any], Any]()
+    while running := running | {pool.submit(compute, part): part for part in islice(left, ahead - len(running))}:
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            yield running.pop(future), future.result()
 
 
 def cluster(address: str) -> Scheduler:
@@ -100,8 +99,8 @@ def cluster(address: str) -> Scheduler:
         client = _client(address)
         from distributed.comm import CommClosedError
 
-        try:
-            yield from _on_cluster(client, compute, parts)
+        try:  # pure=False, because `compute` writes a file
+            yield from _as_they_finish(client.get_executor(pure=False), compute, parts, _CLUSTER_AHEAD)
         except (CommClosedError, CancelledError) as error:
             raise IapbError(f"the scheduler at {address} no longer answers; finished points are kept. Start one "
                             "and run the same command again: it continues there") from error
@@ -124,24 +123,6 @@ def _client(address: str) -> Any:
         raise ArgumentError("--scheduler", address, "the address of a running dask scheduler") from error
 
 
-def _on_cluster(client: Any, compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
-    """Keep _CLUSTER_AHEAD parts submitted. pure=False, because `compute` writes a file."""
-    from distributed import as_completed
-
-    left, part_of = iter(parts), dict[str, Any]()
-
-    def send(part: Any) -> Any:
-        future = client.submit(compute, part, pure=False)
-        part_of[future.key] = part
-        return future
-
-    pending = as_completed([send(part) for part in islice(left, _CLUSTER_AHEAD)])
-    for future in pending:
-        for part in islice(left, 1):
-            pending.add(send(part))
-        yield part_of.pop(future.key), future.result()
-
-
 @contextmanager
 def starting_a_process() -> Iterator[None]:
     """Block SIGINT permanently in every process that is started inside this context.
@@ -160,9 +141,7 @@ def starting_a_process() -> Iterator[None]:
 class _Pool(ProcessPoolExecutor):
     """A process pool that starts its workers on demand, in `submit`, with SIGINT blocked."""
 
-    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
-        with starting_a_process():
-            return super().submit(function, *arguments, **options)
+    submit = starting_a_process()(ProcessPoolExecutor.submit)
 
 
 def _begin(told: Any, parent: int) -> None:

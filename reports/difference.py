@@ -11,10 +11,12 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 from reports.numbers_file import ReportNumbers
-from verification.finding import Table
+from reports.provenance import PEERS, machine_parts
+from verification.table import Table
 
 EXACT, CLOSE, DIFFERS = "exact", "close", "differs"
 TIMING, PROSE, ONLY_OLD, ONLY_NEW = "timing", "prose", "only old", "only new"
@@ -24,6 +26,16 @@ TOLERANCE = 1e-9
 ROUNDING = 1e-12
 # The text of a cell whose case was not run because a smaller case took too long (reference.complementarity).
 LEFT_OUT = "left out"
+
+# Columns of the printed table, which has a row per part of the report; each column with the states that it counts.
+PARTS = (("the same", (EXACT,)), ("within the tolerance", (CLOSE,)), ("differ", (DIFFERS,)),
+         ("in one only", (ONLY_OLD, ONLY_NEW)), ("times, not judged", (TIMING,)),
+         ("other sentences", (PROSE,)))  # fmt: skip
+SHOWN = 20  # lines; the rest is counted
+_WIDEST = 34  # letters of a cell
+# Facts that must be equal for equal results to the last bit, besides those of the machine: OPENBLAS_CORETYPE selects
+# another BLAS kernel on the same processor. Some of the packages compared with are not in the lock file.
+_BITWISE = ("lock", "sources", *PEERS)
 
 
 @dataclass(frozen=True)
@@ -58,120 +70,124 @@ class Difference:
 
     def count(self, state: str) -> int:
         """Return the number of cells in a state."""
-        return sum(cell.state == state for cell in self.cells)
+        return len(self.of(state))
 
     def of(self, state: str) -> tuple[Cell, ...]:
         """Return the cells in a state, the largest gap first."""
         return tuple(sorted((cell for cell in self.cells if cell.state == state), key=lambda cell: -cell.gap))
 
-    def by_part(self) -> dict[str, Counter[str]]:
-        """Return the number of cells in each state by part of the report.
-
-        The part is the text before the first "/" or comma in the name of a table.
-        """
-        found: dict[str, Counter[str]] = {}
-        for cell in self.cells:
-            part = cell.table.partition("/")[0].partition(",")[0]
-            found.setdefault(part, Counter())[cell.state] += 1
-        return found
-
 
 def compare_reports(old: ReportNumbers, new: ReportNumbers, tolerance: float = TOLERANCE) -> Difference:
     """Compare two reports; numbers are close if they differ by at most `tolerance` of the larger, or by ROUNDING."""
-    both = [name for name in old.tables if name in new.tables]
-    cells = [cell for name in both for cell in _cells(name, old.tables[name], new.tables[name], tolerance)]
+    cells = [cell for name, table in old.tables.items() if name in new.tables
+             for cell in _cells(name, table, new.tables[name], tolerance)]  # fmt: skip
     runs = {command: new.runs[command] == content for command, content in old.runs.items() if command in new.runs}
     return Difference(
-        tuple(cells), _only(old.tables, new.tables), _only(new.tables, old.tables), sum(runs.values()),
-        tuple(command for command, same in runs.items() if not same), len(set(old.runs) ^ set(new.runs)),
+        tuple(cells), *(tuple(name for name in first.tables if name not in second.tables)
+                        for first, second in ((old, new), (new, old))),
+        sum(runs.values()), tuple(command for command, same in runs.items() if not same),
+        len(set(old.runs) ^ set(new.runs)),
     )  # fmt: skip
 
 
-def _only(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(name for name in first if name not in second)
-
-
 def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cell]:
-    old_rows, new_rows = _rows(old, new)
-    timed, prose = {*old.timed, *new.timed}, {*old.prose, *new.prose}
-    timed_rows = old.timed_rows or new.timed_rows
+    timed, prose, timed_rows = {*old.timed, *new.timed}, {*old.prose, *new.prose}, old.timed_rows or new.timed_rows
+    names = [_names(one, timed_rows) for one in (old, new)]
+    if len(old.rows) == len(new.rows) and not timed_rows:
+        names = [[f"{number}: {name}" for number, name in enumerate(names[0], 1)]] * 2
+    old_rows, new_rows = ({name: dict(zip(_distinct(one.titles), row, strict=True))
+                           for name, row in zip(_distinct(own), one.cells, strict=True)}
+                          for one, own in zip((old, new), names, strict=True))  # fmt: skip
     for row in dict.fromkeys((*old_rows, *new_rows)):
         first, second = old_rows.get(row, {}), new_rows.get(row, {})
         for column in dict.fromkeys((*first, *second)):
-            if column not in first or column not in second:
-                state, gap = ONLY_OLD if column in first else ONLY_NEW, 0.0
-                by_time = timed_rows
-            else:
+            gap, by_time = 0.0, timed_rows
+            if column in first and column in second:
                 state, gap = compare_values(first[column], second[column], tolerance)
                 by_time = column in timed or LEFT_OUT in (first[column], second[column])
+            else:
+                state = ONLY_OLD if column in first else ONLY_NEW
             state = TIMING if by_time else PROSE if column in prose and state == DIFFERS else state
             yield Cell(table, column, row, first.get(column), second.get(column), state, gap)
 
 
-def _rows(old: Table, new: Table) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
-    """Return the rows of both tables by name.
-
-    If the tables have equally many rows, a row is named by its number and its first cell, else by its first cell alone,
-    with a number after repeated names. If measured times decide which rows exist, a row is named by all untimed cells.
-    """
-    if old.timed_rows or new.timed_rows:
-        return _named(_distinct(_untimed_cells(old)), old), _named(_distinct(_untimed_cells(new)), new)
-    if len(old.rows) == len(new.rows):
-        names = [f"{number}: {row[0]}" if row else str(number) for number, row in enumerate(old.cells, 1)]
-        return _named(names, old), _named(names, new)
-    return _named(_distinct(_first_cells(old)), old), _named(_distinct(_first_cells(new)), new)
-
-
-def _first_cells(table: Table) -> list[str]:
-    return [str(row[0]) if row else "" for row in table.cells]
-
-
-def _untimed_cells(table: Table) -> list[str]:
-    kept = [index for index, column in enumerate(table.titles) if column not in table.timed]
-    return [", ".join(str(row[index]) for index in kept) for row in table.cells]
+def _names(table: Table, timed_rows: bool) -> list[str]:
+    """Return the first cell of each row; if measured times decide which rows exist, all its untimed cells."""
+    if not timed_rows:
+        return [str(row[0]) if row else "" for row in table.cells]
+    untimed = [column not in table.timed for column in table.titles]
+    return [", ".join(map(str, compress(row, untimed))) for row in table.cells]
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
     """Return the names, each repeated one with a number after it."""
-    seen: Counter[str] = Counter()
-    found = []
+    seen, found = Counter[str](), []
     for name in names:
         seen[name] += 1
         found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
     return found
 
 
-def _named(names: Sequence[str], table: Table) -> dict[str, dict[str, Any]]:
-    columns = _distinct(table.titles)
-    return {name: dict(zip(columns, row, strict=True)) for name, row in zip(names, table.cells, strict=True)}
-
-
 def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:
     """Return the state of a comparison of two cells, and their relative difference; texts must be equal."""
-    if _same(old, new):
+    if isinstance(old, bool) == isinstance(new, bool) and (old == new or (old != old and new != new)):  # NaN is NaN
         return EXACT, 0.0
     if old is None or new is None:
         return (ONLY_NEW if old is None else ONLY_OLD), 0.0
-    if _is_number(old) and _is_number(new):
-        gap = _gap(float(old), float(new))
-        return (CLOSE if gap <= tolerance else DIFFERS), gap
-    return DIFFERS, math.inf
+    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in (old, new)):
+        return DIFFERS, math.inf
+    largest, apart = max(abs(old), abs(new)), abs(old - new)
+    gap = math.inf if not math.isfinite(largest) else 0.0 if apart <= ROUNDING else float(apart / largest)
+    return (CLOSE if gap <= tolerance else DIFFERS), gap
 
 
-def _same(old: Any, new: Any) -> bool:
-    both_nan = _is_number(old) and _is_number(new) and math.isnan(old) and math.isnan(new)
-    return both_nan or (isinstance(old, bool) == isinstance(new, bool) and old == new)
+def sentences(found: Difference, tolerance: float) -> Iterator[str]:
+    """Yield sentences that give the numbers of equal, close and different cells, tables and runs."""
+    exact, close, differs, prose = (found.count(state) for state in (EXACT, CLOSE, DIFFERS, PROSE))
+    yield (f"Of {exact + close + differs} numbers and words in both reports, {exact} are exactly the same, {close} "
+           f"agree within {tolerance:.0e} or {ROUNDING:.0e}, whichever is more, and {differs} differ.")  # fmt: skip
+    yield f"{found.count(TIMING)} measured times, and what is made from them, are not judged."
+    if prose:
+        yield f"{prose} sentences differ; they are not judged: their numbers stand in tables."
+    old, new = found.count(ONLY_OLD), found.count(ONLY_NEW)
+    if old or new or found.tables_old or found.tables_new:
+        yield (f"{old} are only in the old report and {new} only in the new one, besides {len(found.tables_old)} and "
+               f"{len(found.tables_new)} whole tables.")  # fmt: skip
+    for title, tables in (("old", found.tables_old), ("new", found.tables_new)):
+        if tables:
+            yield f"Only in the {title} report: {', '.join(tables)}."
+    yield (f"Of {found.runs_same + len(found.runs_other)} runs behind both, {found.runs_same} are the same to the last "
+           f"bit; {found.runs_single} are behind one only.")  # fmt: skip
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def lines(found: Difference) -> Iterator[str]:
+    """Yield a line for each of the SHOWN largest differences: table, row, column, both values, relative difference."""
+    for cell in found.of(DIFFERS)[:SHOWN]:
+        old, new = str(cell.old), str(cell.new)
+        parted = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), 0)
+        start = max(0, parted - 8) if max(len(old), len(new)) > _WIDEST else 0  # shortly before they differ
+        share = f" ({cell.gap:.1e} of it)" if math.isfinite(cell.gap) else ""
+        yield (f"{cell.table}, row {_short(cell.row)}, {_short(cell.column)}: {_short(old[start:])} -> "
+               f"{_short(new[start:])}{share}")  # fmt: skip
 
 
-def _gap(old: float, new: float) -> float:
-    """Return the relative difference, 0 if the difference is within rounding."""
-    if old == new:
-        return 0.0
-    largest = max(abs(old), abs(new))
-    if not math.isfinite(largest):
-        return math.inf
-    return 0.0 if abs(old - new) <= ROUNDING else abs(old - new) / largest
+def parts(found: Difference) -> Iterator[tuple[str, ...]]:
+    """Yield table rows: the part of the report, then the number of its cells in each of the states of PARTS.
+
+    The part is the text before the first "/" or comma in the name of a table.
+    """
+    counts: dict[str, Counter[str]] = {}
+    for cell in found.cells:
+        counts.setdefault(cell.table.partition("/")[0].partition(",")[0], Counter())[cell.state] += 1
+    for part, count in counts.items():
+        yield part, *(str(sum(count[state] for state in states) or "") for _, states in PARTS)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _WIDEST else text[: _WIDEST - 1] + "…"
+
+
+def unlike(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the provenance facts that differ and because of which two reports need not agree to the last bit."""
+    facts = [machine_parts(given) | {name: given.get(name, "") for name in _BITWISE} for given in (old, new)]
+    return tuple(name for name in facts[0] if facts[0][name] != facts[1][name])

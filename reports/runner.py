@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
+from functools import partial as given
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from iapb.simulation import Simulation
 from reference import worlds
 from reference.one_thread import one_thread
 from reports.batches import worker_pool
-from reports.store.folder import Checkpoint, Place, RunStore
+from reports.store.folder import Place, RunStore
 from reports.store.io import mark_store
 from reports.store.runs import RunEntry
 from reports.streaming import stream
@@ -24,16 +24,7 @@ from verification.finding import attempt
 
 Progress = Callable[[int, int], None]
 Wanted = tuple[Scene, str, str]
-
-
-@dataclass(frozen=True)
-class Fetched:
-    """A run, the index entry of its file, its place in the store, and whether its file existed before."""
-
-    run: Run
-    entry: RunEntry
-    place: Place
-    existed: bool
+Fetched = tuple[Run, RunEntry]
 
 
 class Runner:
@@ -62,20 +53,21 @@ class Runner:
         An incomplete run is stored as partial. Then the error that stopped it is raised; with `partial` the run is
         returned instead.
         """
-        fetched = self.fetch(scene, world, rendering, keep=keep)
+        run, entry = self.fetch(scene, world, rendering, keep=keep)
         if not partial:
-            worlds.require_complete(fetched.run)
-        self._note(fetched, scene, world, rendering)
-        return fetched.run
+            worlds.require_complete(run)
+        self._know(entry, scene, world, rendering)
+        self.use_again(entry.file)
+        return run
 
     def fetch(self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True) -> Fetched:
-        """Return the run of `scene` in `world` with its place, even if the simulation gave up."""
+        """Return the run of `scene` in `world` and the entry of its file, even if the simulation gave up."""
         place = self._place(scene, world, rendering)
         if place.path.name in self._held:
             return self._held[place.path.name]
-        existed = place.path.is_file()
-        fetched = Fetched(*self.store.fetch(place, self._computer(scene, world, rendering)), place, existed)
-        if keep and fetched.run.complete:
+        compute = given(worlds.run_world, scene, world, rendering, progress=self.progress, partial=True)
+        fetched = self.store.fetch(place, compute)
+        if keep and fetched[0].complete:
             self._held[place.path.name] = fetched
         return fetched
 
@@ -91,9 +83,8 @@ class Runner:
         found = worlds.find_world(world, rendering)
         simulation = Simulation(scene, found.law, found.coupling_in(scene))
         with one_thread():  # as run_world does
-            streamed = stream(place, simulation, worlds.label_of(world, rendering), scene.steps, resume=resume,
-                              progress=self.progress)  # fmt: skip
-        return place, streamed
+            return place, stream(place, simulation, worlds.label_of(world, rendering), scene.steps, resume=resume,
+                                 progress=self.progress)  # fmt: skip
 
     @contextmanager
     def recording(self, user: str) -> Iterator[dict[str, UsedRun]]:
@@ -137,26 +128,20 @@ class Runner:
         with worker_pool(workers) as pool:
 
             def made(wanted: Sequence[Wanted]) -> Iterator[Run | None]:
-                results = pool.map(partial(_fetched, str(self.store.folder)), wanted)
-                for (scene, world, rendering), fetched in zip(wanted, results, strict=True):
+                results = pool.map(given(_fetched, str(self.store.folder)), wanted)
+                for asked, fetched in zip(wanted, results, strict=True):
                     if fetched is not None:
-                        self._know(fetched, scene, world, rendering)
-                    yield None if fetched is None else fetched.run
+                        self._know(fetched[1], *asked)
+                    yield fetched and fetched[0]
 
             yield made
 
-    def _note(self, fetched: Fetched, scene: Scene, world: str, rendering: str) -> None:
-        """Record that the current user uses a run."""
-        self._know(fetched, scene, world, rendering)
-        self.use_again(fetched.entry.file)
-
-    def _know(self, fetched: Fetched, scene: Scene, world: str, rendering: str) -> None:
-        name, entry = fetched.entry.file, fetched.entry
-        if name not in self._known:
-            command = run_command(scene, world, rendering) or f"iapb store again out/runs/{name}"
-            size = (self.store.folder / name).stat().st_size
-            self._known[name] = UsedRun(self.label(scene, world, rendering), name, entry.run_key, entry.content_hash,
-                                        command, size, entry.status)
+    def _know(self, entry: RunEntry, scene: Scene, world: str, rendering: str) -> None:
+        if entry.file not in self._known:
+            command = run_command(scene, world, rendering) or f"iapb store again out/runs/{entry.file}"
+            size = (self.store.folder / entry.file).stat().st_size
+            self._known[entry.file] = UsedRun(self.label(scene, world, rendering), entry.file, entry.run_key,
+                                              entry.content_hash, command, size, entry.status)  # fmt: skip
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:
@@ -169,21 +154,11 @@ class Runner:
         found = worlds.find_world(world, rendering)
         return run_inputs(scene, found.law, found.coupling_in(scene), world)
 
-    def _computer(self, scene: Scene, world: str, rendering: str) -> Callable[[Checkpoint], Run]:
-        def compute(checkpoint: Checkpoint) -> Run:
-            return worlds.run_world(scene, world, rendering, progress=self.progress, partial=True,
-                                    checkpoint=checkpoint)  # fmt: skip
-
-        return compute
-
 
 def _fetched(folder: str, wanted: Wanted) -> Fetched | None:
-    """Return a run, in a worker process; None if it raises or is incomplete.
-
-    The parent then requests such a run again, so that the error is raised there.
-    """
-    fetched = attempt("run", partial(Runner(folder).fetch, *wanted, keep=False), [])
-    return fetched if fetched is not None and fetched.run.complete else None
+    """Return a run, in a worker process; None if it raises or is incomplete, so that the parent requests it again."""
+    fetched = attempt("run", given(Runner(folder).fetch, *wanted, keep=False), [])
+    return fetched if fetched is not None and fetched[0].complete else None
 
 
 def run_inputs(scene: Scene, law: Any, coupling: Any, world: str) -> dict[str, Any]:

@@ -12,9 +12,8 @@ import typer
 
 from iapb.errors import ArgumentError
 from reports.commands.answer import Answer, Json
-from reports.difference import DIFFERS, Difference, compare_reports
-from reports.difference_text import PARTS, SHOWN, parts, sentences, unlike
-from reports.difference_text import lines as largest
+from reports.difference import DIFFERS, PARTS, SHOWN, Difference, compare_reports, parts, sentences, unlike
+from reports.difference import lines as largest
 from reports.numbers_file import read_numbers
 from verification.table import Table, titled
 

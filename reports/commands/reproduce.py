@@ -16,9 +16,7 @@ from iapb.names import one_of
 from reports.commands.answer import Json, facts_of, print_lines
 from reports.commands.progress import stage_progress
 from reports.commands.report import difference_lines
-from reports.companions import remembering, write_companions
-from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports
-from reports.difference_text import unlike
+from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, unlike
 from reports.evidence.gather import failed_cases, gather
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.figures import RECIPES
@@ -28,7 +26,7 @@ from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, figure_inputs
 from reports.pages.quantities import contradictions, unsaid
 from reports.pages.records import Evidence, FailedCases
-from reports.report import write_report
+from reports.report import remembering, write_companions, write_report
 from reports.runner import Runner
 from verification.finding import Failure
 

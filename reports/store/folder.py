@@ -1,85 +1,41 @@
 """RunStore: a folder of runs, one HDF5 file each; no run is computed twice.
 
     store = RunStore("out/runs")
-    run = store.get_or_run(inputs, lambda checkpoint: simulate(scene, law))
+    run = store.get_or_run(inputs, lambda: simulate(scene, law))
 
-A file is named by a label and its run key, the hash of everything that determines the run. During a run its last
-checkpoint is ``<name>.h5.partial``: a complete file, replaced atomically, so that it can be read at any time, also
-after the process was killed. A finished file is never written again.
-
-Each checkpoint is a complete file, because a growing file that is only flushed might be unreadable after a kill.
-`Checkpoint` limits the time for writing to a fixed share of the computing time.
+A file is named by a label and its run key, the hash of everything that determines the run. A run that gave up is
+stored as ``<name>.h5.partial``, for readers, and is computed again next time. A finished file is never written again.
 """
 
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store.io import (
-    abandoned,
-    mark_store,
-    remove_unless_locked,
-)
+from reports.store.io import abandoned, mark_store, remove_unless_locked
 from reports.store.keys import code_label, run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 from verification.finding import of_each
 
 PARTIAL_SUFFIX = ".partial"
 _KEY_DIGITS = 16  # 64 bits: a collision among a million runs has a probability below 1e-7; the file has all 256 bits
-# The pause between two checkpoints is at least this long, and at least this many times the last writing time.
-_SHORTEST_PAUSE_SECONDS = 5.0
-_PAUSE_PER_WRITE = 20.0
-
-
-@dataclass
-class Checkpoint:
-    """Saves an unfinished run from time to time. Call it with the current run as often as you like.
-
-    ``checkpoint.due`` is whether the next call would write; check it first if making a Run takes time.
-    ``checkpoint(run, force=True)`` writes at once, for example before the simulation gives up.
-    """
-
-    path: Path
-    key: str = ""
-    pause: float = _SHORTEST_PAUSE_SECONDS  # [s]
-    _next: float = field(default=0.0, init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        self._next = time.monotonic() + self.pause
-
-    @property
-    def due(self) -> bool:
-        """Return whether enough time has passed since the last checkpoint."""
-        return time.monotonic() >= self._next
-
-    def __call__(self, run: Run, *, force: bool = False) -> bool:
-        """Save `run` if a checkpoint is due; return whether it was saved."""
-        if not (force or self.due):
-            return False
-        start = time.monotonic()
-        store_run(self.path, run, key=self.key, replace=True)
-        end = time.monotonic()
-        self._next = end + max(self.pause, _PAUSE_PER_WRITE * (end - start))
-        return True
 
 
 @dataclass(frozen=True)
 class Place:
-    """The place of a run in a store: its key, its file, and the file of its last checkpoint."""
+    """The place of a run in a store: its key, and its file."""
 
     key: str
     path: Path
 
     @property
     def partial(self) -> Path:
-        """Return the file of the last checkpoint."""
+        """Return the file of an unfinished run."""
         return self.path.with_name(self.path.name + PARTIAL_SUFFIX)
 
 
@@ -111,38 +67,10 @@ class RunStore:
         The file name starts with `label`. The label is not part of the key: a run is found under any label.
         """
         key = run_key(inputs, self.code)
-        found = sorted(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"))
-        return Place(key, found[0] if found else self.folder / file_name(label, key))
+        path = self.folder / file_name(label, key)
+        return Place(key, path if path.is_file() else min(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"), default=path))
 
-    def path_of(self, inputs: Mapping[str, Any], label: str = "run") -> Path:
-        """Return the file that the run of `inputs` has, or will have."""
-        return self.place_of(inputs, label).path
-
-    def __contains__(self, inputs: Mapping[str, Any]) -> bool:
-        return self.path_of(inputs).is_file()
-
-    def get(self, inputs: Mapping[str, Any]) -> Run | None:
-        """Return the finished run of `inputs`, or None if there is none yet.
-
-        Raises
-        ------
-        RunFileError
-            Its file is damaged. A damaged file is not replaced automatically: remove it to compute the run again.
-        """
-        found = self._read(self.place_of(inputs))
-        return None if found is None else found[0]
-
-    def _read(self, place: Place) -> tuple[Run, RunEntry] | None:
-        if not place.path.is_file():
-            return None
-        run, entry = read_stored(place.path)
-        if entry.run_key != place.key:
-            raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
-        return run, entry
-
-    def get_or_run(
-        self, inputs: Mapping[str, Any], compute: Callable[[Checkpoint], Run], label: str = "run"
-    ) -> Run:
+    def get_or_run(self, inputs: Mapping[str, Any], compute: Callable[[], Run], label: str = "run") -> Run:
         """Return the run of `inputs`: read it from its file if there is one, else compute and store it.
 
         Parameters
@@ -150,7 +78,7 @@ class RunStore:
         inputs
             Everything that determines the run, as mappings, sequences, arrays, numbers and texts.
         compute
-            Computes the run. It may call the `Checkpoint` that it gets with the unfinished run.
+            Computes the run.
         label
             Start of the file's name.
 
@@ -159,16 +87,23 @@ class RunStore:
         Run
             It has ``complete=False`` if `compute` gave up early. Then it is stored as partial and computed again next
             time.
+
+        Raises
+        ------
+        RunFileError
+            The file is damaged. A damaged file is not replaced automatically: remove it to compute the run again.
         """
         return self.fetch(self.place_of(inputs, label), compute)[0]
 
-    def fetch(self, place: Place, compute: Callable[[Checkpoint], Run]) -> tuple[Run, RunEntry]:
+    def fetch(self, place: Place, compute: Callable[[], Run]) -> tuple[Run, RunEntry]:
         """Return the run of a place and the entry of its file; see `get_or_run`."""
-        stored = self._read(place)
-        if stored is not None:
-            return stored
+        if place.path.is_file():
+            run, entry = read_stored(place.path)
+            if entry.run_key != place.key:
+                raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
+            return run, entry
         mark_store(self.folder)
-        run = compute(Checkpoint(place.partial, place.key))
+        run = compute()
         if not isinstance(run, Run):
             raise ArgumentError("compute", run, "a function that returns a Run")
         if not run.complete:
@@ -178,7 +113,7 @@ class RunStore:
     def put(self, inputs: Mapping[str, Any], run: Run, label: str = "run") -> Path:
         """Store a finished run and return its file; an existing file is not changed."""
         if not run.complete:
-            raise ArgumentError("run.complete", run.complete, "True: use Checkpoint to store an unfinished run")
+            raise ArgumentError("run.complete", run.complete, "True: a finished run")
         place = self.place_of(inputs, label)
         mark_store(self.folder)
         self._keep(place, run)
@@ -192,10 +127,6 @@ class RunStore:
     def entries(self) -> tuple[RunEntry, ...]:
         """Return one entry per finished run in the folder, by file name; other and damaged files are left out."""
         return tuple(of_each(sorted(self.folder.glob("*.h5")), lambda path: [read_entry(path)], []))
-
-    def partial_runs(self) -> tuple[Path, ...]:
-        """Return the files of unfinished runs."""
-        return tuple(sorted(self.folder.glob(f"*.h5{PARTIAL_SUFFIX}")))
 
 
 def file_name(label: str, key: str) -> str:

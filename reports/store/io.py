@@ -15,7 +15,7 @@ import os
 import re
 import stat
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -215,24 +215,6 @@ def is_ours(path: Path) -> bool:
 def sealed(content: bytes) -> bytes:
     """Return a file's content with its checksum appended."""
     return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
-
-
-def append_line(path: Path, record: Mapping[str, Any]) -> None:
-    """Append a record as a line of JSON with a single write, so that the lines of two processes are not mixed."""
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-    try:
-        size = os.fstat(handle).st_size
-        cut_off = size and os.pread(handle, 1, size - 1) != b"\n"  # by a crash
-        os.write(handle, b"\n" * bool(cut_off) + json.dumps(record, ensure_ascii=False).encode() + b"\n")
-    finally:
-        os.close(handle)
-
-
-def read_lines(path: Path) -> Iterator[Any]:
-    """Yield the records of a file of JSON lines; skip incomplete lines, and yield nothing if there is no file."""
-    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
-        with suppress(ValueError):
-            yield json.loads(line)
 
 
 def check_seal(path: Path) -> None:

@@ -18,7 +18,6 @@ from iapb.scene import find_scene, scene_folder, scene_names
 from iapb.scene.document import MAX_CHARACTERS, Document
 from iapb.scene.parts import Name, Number, Part, Text, mistakes_of
 from iapb.scene.parts import Path as FieldPath
-from reports.store.keys import hash_of
 
 LAW = "law."  # paths below it are settings of the contact law
 MAX_POINTS = 1_000_000  # files in one folder: a larger study is probably a mistake
@@ -204,11 +203,6 @@ class Point:
     rendering: str
     values: dict[str, Any]
     law: dict[str, Any]
-
-    def key(self, code: str) -> str:
-        """Return a hash of the point and of the given version of code and scene."""
-        asked = {"world": self.world, "rendering": self.rendering, "values": self.values, "law": self.law}
-        return hash_of({"asked": asked, "code": code})[:32]
 
 
 def points_of(study: Study, scene: str) -> Iterator[Point]:

@@ -1,17 +1,14 @@
 """Run a sweep: finished points are kept if it is killed, and the results do not depend on order or workers.
 
-    out/sweeps/<study>/runs/*.h5        one run file per point
-    out/sweeps/<study>/results.jsonl    a line per finished point, appended as it comes
+    out/sweeps/<study>/runs/*.h5        one run file per point; a point that has one is not simulated again
     out/sweeps/<study>/summary.h5       the table of all points, written when all are finished
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -20,22 +17,20 @@ import numpy as np
 
 from iapb.errors import ArgumentError, IapbError
 from iapb.names import one_of
-from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
 from reference.one_thread import one_thread
 from reference.worlds import find_world, require_complete
 from reports.batches import Scheduler, do_missing, here
 from reports.runner import run_inputs
-from reports.store.folder import Checkpoint, Place, RunStore, file_name
-from reports.store.io import append_line, mark_store, read_lines
-from reports.store.keys import code_version, run_key
-from reports.store.runs import RunEntry
+from reports.store.folder import RunStore
+from reports.store.io import mark_store
+from reports.store.keys import code_version
 from reports.store.tables import Column, Table, write_table
 from reports.sweeps.study import Point, Study, points_of
 
 DONE, FAILED = "done", "failed"
-JOURNAL, RUNS, SUMMARY = "results.jsonl", "runs", "summary.h5"
+RUNS, SUMMARY = "runs", "summary.h5"
 _MEASURES = {"impacts": "1", "energy_lost": "J", "penetration": "m", "kinetic_energy": "J"}
 
 
@@ -44,8 +39,8 @@ class Result:
     """The result of one point; for a failed point the measures are None, and `note` is the reason."""
 
     index: int
-    point: str  # key of the point
     status: str
+    reused: bool = False  # the run file was there
     file: str = ""
     content_hash: str = ""
     note: str = ""
@@ -59,13 +54,17 @@ class Result:
 class SweepOutcome:
     """A finished sweep.
 
-    results : by index of the point; reused : number of points finished before; content_hash : hash of all results
+    results : by index of the point; content_hash : hash of all results
     """
 
     folder: Path
     results: tuple[Result, ...]
-    reused: int
     content_hash: str
+
+    @property
+    def reused(self) -> int:
+        """Return the number of points that were finished before."""
+        return sum(result.reused for result in self.results)
 
     @property
     def failed(self) -> tuple[Result, ...]:
@@ -77,7 +76,7 @@ def run_sweep(
     study: Study, scene: str, out: Path | str = "out/sweeps", scheduler: Scheduler = here,
     progress: Callable[[int, int], None] | None = None,
 ) -> SweepOutcome:
-    """Compute every point of a study that has no result yet.
+    """Compute every point of a study that has no run file yet.
 
     Parameters
     ----------
@@ -90,39 +89,13 @@ def run_sweep(
     folder = Path(out).resolve() / study.name
     mark_store(folder)
     RunStore(folder / RUNS)  # makes the folder
-    code = _code(scene)
-    points = list(points_of(study, str(Path(scene).resolve())))
-    found = _journal(folder)
-    results = {p.index: r for p in points if (r := found.get(p.key(code))) is not None}
-    reused = len(results)
-
-    def keep(point: Point, result: Result) -> None:
-        results[point.index] = replace(result, point=point.key(code))
-        append_line(folder / JOURNAL, asdict(results[point.index]))
-
-    do_missing(points, partial(compute_point, folder=str(folder / RUNS), code=code_version()), keep,
-               done=lambda point: point.index in results, scheduler=scheduler,
-               progress=progress or (lambda done, total: None))  # fmt: skip
-    ordered = tuple(results[p.index] for p in points)
+    points, results = list(points_of(study, str(Path(scene).resolve()))), dict[int, Result]()
+    do_missing(points, partial(compute_point, folder=str(folder / RUNS), code=code_version()),
+               lambda point, result: results.update({point.index: result}), done=lambda point: False,
+               scheduler=scheduler, progress=progress or (lambda done, total: None))  # fmt: skip
+    ordered = tuple(results[point.index] for point in points)
     _write_summary(folder / SUMMARY, study, points, ordered)
-    return SweepOutcome(folder, ordered, reused, _hash(ordered))
-
-
-def _code(scene: str) -> str:
-    """Return the version of code and scene, which both determine the result of a point."""
-    return hashlib.sha256(code_version().encode() + Path(scene).read_bytes()).hexdigest()
-
-
-def _journal(folder: Path) -> dict[str, Result]:
-    """Return the finished points by key; incomplete lines, failed points and runs without a file are left out."""
-    found: dict[str, Result] = {}
-    there = {entry.name for entry in os.scandir(folder / RUNS)}
-    for record in read_lines(folder / JOURNAL):
-        with suppress(TypeError):
-            result = Result(**record)
-            if result.status == DONE and result.file in there:
-                found[result.point] = result
-    return found
+    return SweepOutcome(folder, ordered, _hash(ordered))
 
 
 def _hash(results: tuple[Result, ...]) -> str:
@@ -138,7 +111,8 @@ def _write_summary(path: Path, study: Study, points: list[Point], results: tuple
     columns = [Column("point", np.arange(len(points)), "1", "index of the point")]
     columns += [Column("world", tuple(point.world for point in points), "1", "world")]
     columns += list(_changed(points))
-    columns += [Column(name, _numbers(results, name), unit, name.replace("_", " ")) for name, unit in _MEASURES.items()]
+    columns += [Column(name, np.array([getattr(result, name) for result in results], float), unit,
+                       name.replace("_", " ")) for name, unit in _MEASURES.items()]  # fmt: skip
     columns += [Column(name, tuple(getattr(result, name) for result in results), "1", name.replace("_", " "))
                 for name in ("status", "note", "file", "content_hash")]
     write_table(path, Table(study.name, tuple(columns), study.title or study.name, command="iapb sweep"))
@@ -151,10 +125,6 @@ def _changed(points: list[Point]) -> Iterator[Column]:
         numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
         shown = np.array(values, float) if numeric else tuple(str(value) for value in values)
         yield Column(path, shown, "SI" if numeric else "1", f"value of {path}")
-
-
-def _numbers(results: tuple[Result, ...], name: str) -> np.ndarray:
-    return np.array([np.nan if (value := getattr(result, name)) is None else float(value) for result in results])
 
 
 def compute_point(point: Point, folder: str, code: str) -> Result:
@@ -174,27 +144,22 @@ def compute_point(point: Point, folder: str, code: str) -> Result:
         raise IapbError("a worker runs another version of iapb: install the same one on every machine")
     if not Path(folder).is_dir():
         raise IapbError(f"a worker does not see the folder {folder}: the machines of a cluster must share it")
-    key = point.key(code)
     try:
-        run, entry = _run(point, Path(folder))
+        scene = _scene(point.scene).with_values(point.values)
+        world = find_world(point.world, point.rendering)
+        law, coupling = _with_settings(world.law, point.law), world.coupling_in(scene)
+        place = _store(Path(folder)).place_of(run_inputs(scene, law, coupling, point.world),
+                                              f"{scene.name}-{point.world}")
+        reused = place.path.is_file()
+        with one_thread():  # so sums do not depend on the cores
+            run, entry = _store(Path(folder)).fetch(
+                place, lambda: require_complete(simulate(scene, law, coupling, world=point.world)))
     except IapbError as error:
-        return Result(point.index, key, FAILED, note=" ".join(str(error).split()))
-    return Result(point.index, key, DONE, entry.file, entry.content_hash, "", **_measures(run))
-
-
-def _run(point: Point, folder: Path) -> tuple[Run, RunEntry]:
-    """Return the run of a point and its file's entry; BLAS uses one thread, so sums do not depend on the cores."""
-    scene = _scene(point.scene).with_values(point.values)
-    world = find_world(point.world, point.rendering)
-    law, coupling = _with_settings(world.law, point.law), world.coupling_in(scene)
-    key = run_key(run_inputs(scene, law, coupling, point.world))
-    place = Place(key, folder / file_name(f"{scene.name}-{point.world}", key))
-
-    def compute(_: Checkpoint) -> Run:
-        return require_complete(simulate(scene, law, coupling, world=point.world))
-
-    with one_thread():
-        return _store(folder).fetch(place, compute)
+        return Result(point.index, FAILED, note=" ".join(str(error).split()))
+    energy = run.energy.get("kinetic")
+    return Result(point.index, DONE, reused, entry.file, entry.content_hash, "", len(run.impacts.step),
+                  float(np.sum(run.impacts.energy_lost)), max(0.0, -float(run.contacts.gap.min(initial=0.0))),
+                  None if energy is None else float(energy[-1]))
 
 
 @cache
@@ -215,13 +180,3 @@ def _with_settings(law: Any, settings: dict[str, Any]) -> Any:
             expected = one_of(name, known or ["it has none"], f"a setting of the law {law.name!r}: ")
             raise ArgumentError(f"law.{name}", value, expected)
     return replace(law, **settings) if settings else law
-
-
-def _measures(run: Run) -> dict[str, Any]:
-    energy = run.energy.get("kinetic")
-    return {
-        "impacts": len(run.impacts.step),
-        "energy_lost": float(np.sum(run.impacts.energy_lost)),
-        "penetration": max(0.0, -float(run.contacts.gap.min(initial=0.0))),
-        "kinetic_energy": None if energy is None else float(energy[-1]),
-    }

@@ -13,8 +13,7 @@ from typing import Any
 import pytest
 
 from iapb.scene import find_scene, load_scene
-from reports import companions, provenance
-from reports.companions import DIRTY_NAME, remembering, write_companions
+from reports import provenance, report
 from reports.crate import CRATE_NAME, PROFILE, sha256
 from reports.evidence import gather
 from reports.evidence.manifest import ABSENT, manifest
@@ -23,7 +22,7 @@ from reports.figures.figure import Figure, Panel, Recipe
 from reports.numbers_file import NUMBERS_NAME, read_numbers
 from reports.pages.builder import FIRST_PAGE, build_report
 from reports.pages.records import Evidence
-from reports.report import write_report
+from reports.report import DIRTY_NAME, remembering, write_companions, write_report
 from reports.runner import Runner
 from reports.store.io import MARK_NAME
 from verification.finding import REPRODUCED, Finding, Part, finding_of, titled
@@ -51,7 +50,7 @@ def out(tmp_path_factory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         words = [str(folder / "bin" / "iapb"), "reproduce", "--out", str(folder), f"--check={folder}"]
         patch.setattr(sys, "argv", words)
-        patch.setattr(companions, "uncommitted_changes", lambda: "--- a/iapb/x.py\n+++ b/iapb/x.py")
+        patch.setattr(report, "uncommitted_changes", lambda: "--- a/iapb/x.py\n+++ b/iapb/x.py")
         evidence = Evidence(inputs={"bulk": titled(("n",), ((3,),))}, claims=claims, provenance=gather.provenance(),
                             manifest=manifest(runner.used, [stage], folder))  # fmt: skip
         recipes, figures = remembering((RECIPE,))
@@ -136,7 +135,7 @@ def test_nothing_says_on_which_machine_it_was_made(out: Path) -> None:
 
 def test_changes_that_are_committed_leave_no_patch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / DIRTY_NAME).write_text("old")
-    monkeypatch.setattr(companions, "uncommitted_changes", lambda: "")
+    monkeypatch.setattr(report, "uncommitted_changes", lambda: "")
     (tmp_path / FIRST_PAGE).write_text("<p>")
     written = write_companions(tmp_path, Evidence(), {}, "quick")
     assert not (tmp_path / DIRTY_NAME).exists() and DIRTY_NAME not in [path.name for path in written]

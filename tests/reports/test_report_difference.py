@@ -17,11 +17,15 @@ from reports.difference import (
     ONLY_NEW,
     ONLY_OLD,
     PROSE,
+    SHOWN,
     TIMING,
     compare_reports,
     compare_values,
+    lines,
+    parts,
+    sentences,
+    unlike,
 )
-from reports.difference_text import SHOWN, lines, parts, sentences, unlike
 from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
 from verification.finding import titled
 

@@ -78,7 +78,7 @@ def open_store(folder: Path) -> RunStore:
 
 def whole(store: RunStore, number: int) -> bool:
     """Whether the run of that number is there and is what was stored."""
-    path = store.path_of(inputs_of(number))
+    path = store.place_of(inputs_of(number)).path
     return path.is_file() and content_hash(read_run(path)) == content_hash(numbered(number))
 
 
@@ -133,7 +133,7 @@ def full_disk(folder: Path, times: int) -> tuple[int, int, int, str]:
         writer = in_child(_write_with_limit, folder, number, int(rng.uniform(0.0, 0.99) * size), sender)
         writer.join()
         told = receiver.recv() if receiver.poll() else ""
-        kept, half = whole(store, 0), store.path_of(inputs_of(number)).exists()
+        kept, half = whole(store, 0), store.place_of(inputs_of(number)).path.exists()
         broken = any(state.state == DAMAGED for state in check_store(folder))
         lost += not kept
         survived += kept and not half and not broken and bool(told) and writer.exitcode == 0

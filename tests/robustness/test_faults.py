@@ -40,7 +40,7 @@ def test_a_writer_that_writes_in_place_is_caught(tmp_path: Path, monkeypatch: py
     """The planted fault: straight into the target, unsynced and unsealed, said to be finished beforehand."""
     def careless(folder: Path) -> None:
         store = open_store(folder)
-        with store.path_of(inputs_of(0), "sample").open("wb") as file:
+        with store.place_of(inputs_of(0), "sample").path.open("wb") as file:
             (folder / "finished").write_text("0\n")
             while True:
                 file.write(b"\x89HDF\r\n\x1a\n" * 100)
@@ -48,7 +48,7 @@ def test_a_writer_that_writes_in_place_is_caught(tmp_path: Path, monkeypatch: py
                 time.sleep(1e-3)
 
     monkeypatch.setattr(faults, "_write_for_ever", careless)
-    monkeypatch.setattr(faults, "whole", lambda store, number: _readable(store.path_of(inputs_of(number))))
+    monkeypatch.setattr(faults, "whole", lambda store, number: _readable(store.place_of(inputs_of(number)).path))
     tried, survived, lost, _ = killed_writer(tmp_path, 3)
     assert (tried, survived) == (3, 0) or lost > 0
 

@@ -49,15 +49,6 @@ def test_a_law_setting_is_no_scene_value(text: str) -> None:
     assert "law.integrator" not in point.values
 
 
-def test_the_key_of_a_point_knows_its_values_and_the_code_but_not_its_place(study: Study) -> None:
-    from dataclasses import replace
-
-    first, second = list(points_of(study, "s"))[:2]
-    assert first.key("a") != second.key("a")
-    assert first.key("a") != first.key("b")
-    assert replace(first, index=5).key("a") == first.key("a")
-
-
 @pytest.mark.parametrize("scale", ["linear", "log"])
 def test_a_range_has_its_ends_exactly_and_even_steps(scale: str) -> None:
     values = Range.model_validate({"from": 0.1, "to": 1e3, "count": 5, "scale": scale}).values()

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,6 @@ from reports.store.tables import read_table
 from reports.sweeps.study import Point, Study, study_from_text
 from reports.sweeps.sweep import (
     FAILED,
-    JOURNAL,
     RUNS,
     SUMMARY,
     Result,
@@ -64,20 +64,24 @@ def test_a_sweep_that_was_stopped_goes_on_and_ends_alike(
     assert [r.file for r in outcome.results] == [r.file for r in undisturbed.results]
 
 
-def test_a_finished_sweep_computes_nothing(study: Study, tmp_path: Path) -> None:
-    first = run_sweep(study, SCENE, tmp_path)
-    again = run_sweep(study, SCENE, tmp_path, stopping_after(0))
-    assert (again.reused, again.content_hash) == (6, first.content_hash)
+def test_a_finished_sweep_computes_nothing(
+    study: Study, undisturbed: SweepOutcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("reports.sweeps.sweep.simulate", lambda *_, **__: pytest.fail("simulated again"))
+    again = run_sweep(study, SCENE, undisturbed.folder.parent)
+    assert (again.reused, again.content_hash) == (6, undisturbed.content_hash)
+    assert [replace(result, reused=False) for result in again.results] == list(undisturbed.results)
 
 
-def test_a_torn_line_and_a_lost_file_are_computed_again(study: Study, undisturbed: SweepOutcome) -> None:
-    folder = undisturbed.folder
-    (folder / RUNS / undisturbed.results[0].file).unlink()
-    journal = folder / JOURNAL
-    journal.write_bytes(journal.read_bytes()[:-40])
-    outcome = run_sweep(study, SCENE, folder.parent)
-    assert outcome.reused == 4
-    assert outcome.content_hash == undisturbed.content_hash
+def test_a_lost_file_is_computed_again_and_a_damaged_one_is_told(study: Study, undisturbed: SweepOutcome) -> None:
+    lost, damaged = (undisturbed.folder / RUNS / result.file for result in undisturbed.results[:2])
+    lost.unlink()
+    content = damaged.read_bytes()
+    damaged.write_bytes(content[:-100])
+    outcome = run_sweep(study, SCENE, undisturbed.folder.parent)
+    assert outcome.reused == 4 and [damaged.name in result.note for result in outcome.failed] == [True]
+    damaged.write_bytes(content)
+    assert run_sweep(study, SCENE, undisturbed.folder.parent).content_hash == undisturbed.content_hash
 
 
 def test_other_values_give_another_hash(text: str, undisturbed: SweepOutcome, tmp_path: Path) -> None:
@@ -156,9 +160,9 @@ def test_a_killed_command_goes_on_and_ends_alike(text: str, undisturbed: SweepOu
     (tmp_path / "small.yaml").write_text(text)
     command = [sys.executable, "-m", "reports.cli", "sweep", str(tmp_path / "small.yaml"), "--workers", "1",
                "--out", str(tmp_path / "out")]
-    journal = tmp_path / "out" / "small" / JOURNAL
+    runs = tmp_path / "out" / "small" / RUNS
     killed = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-    while killed.poll() is None and not (journal.is_file() and journal.stat().st_size):
+    while killed.poll() is None and not list(runs.glob("*.h5")):
         time.sleep(0.01)
     os.killpg(killed.pid, signal.SIGKILL)
     killed.wait()
