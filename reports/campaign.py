@@ -15,17 +15,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from reports.batches import do_missing, here, processes
 from reports.counterexamples import CampaignRequest, keep_counterexample
 from reports.store.io import mark_store
-from reports.store.tables import Column, Table, read_table, write_table
+from reports.store.tables import read_record, write_record
 from verification.laws.bounds import LawCount, LawResidual
 from verification.laws.campaign import Batch, BatchOutcome, do_batch
 
-_TABLE = "laws"
-_COMMAND = "iapb verify --full"
 # Largest number of files per law; each is a run of about 150 kB. More counterexamples would not give more insight.
 KEPT_PER_LAW = 1000
 
@@ -62,22 +58,26 @@ class Campaign:
             kept[found.law] += 1
             if kept[found.law] <= KEPT_PER_LAW:
                 keep_counterexample(self.folder / "counterexamples", found, self.request)
-        write_table(self.path_of(batch), _table(batch, outcome))
+        title = f"{batch.part}, cases {batch.first} and {batch.count - 1} more"
+        write_record(self.path_of(batch), {"laws": outcome.counts, "seconds": outcome.seconds}, title,
+                     command="iapb verify --full")  # fmt: skip
+
+    def _stored(self, batches: Iterable[Batch]) -> Iterator[tuple[Batch, Any]]:
+        return ((batch, read_record(path)) for batch in batches if (path := self.path_of(batch)).is_file())
 
     def counts(self, batches: Iterable[Batch]) -> dict[str, dict[str, LawCount]]:
         """Return the counts summed over the stored batches, by part and law."""
         sums: dict[str, dict[str, LawCount]] = {}
-        for batch in batches:
-            if self.path_of(batch).is_file():
-                own = sums.setdefault(batch.part, {})
-                for count in _read(self.path_of(batch)):
-                    own[count.law] = own[count.law] + count if count.law in own else count
+        for batch, stored in self._stored(batches):
+            own = sums.setdefault(batch.part, {})
+            for told in stored["laws"]:
+                count = LawCount(**told | {"worst": told["worst"] and LawResidual(**told["worst"])})
+                own[count.law] = own[count.law] + count if count.law in own else count
         return sums
 
     def seconds(self, batches: Iterable[Batch]) -> float:
         """Return the sum of the computing times of all batches [s]."""
-        paths = [self.path_of(batch) for batch in batches]
-        return sum(float(read_table(path)["seconds"][0]) for path in paths if path.is_file())
+        return sum(stored["seconds"] for _, stored in self._stored(batches))
 
     def counterexamples(self) -> list[Path]:
         """Return the files of all counterexamples."""
@@ -87,24 +87,3 @@ class Campaign:
 def outcome_of(request: CampaignRequest, batch: Batch) -> BatchOutcome:
     """Compute one batch. The resolver is imported by its name, so this also works in a worker process."""
     return do_batch(batch, request.subject())
-
-
-def _table(batch: Batch, outcome: BatchOutcome) -> Table:
-    counts = outcome.counts
-    worst: list[Any] = [count.worst for count in counts]
-    columns = (
-        Column("law", tuple(count.law for count in counts), "1", "law"),
-        Column("checked", np.array([count.checked for count in counts]), "1", "cases that it applied to"),
-        Column("failures", np.array([count.failures for count in counts]), "1", "cases that broke it"),
-        Column("worst", np.array([one.value for one in worst]), "1", "residual nearest to its tolerance"),
-        Column("tolerance", np.array([one.tolerance for one in worst]), "1", "its tolerance"),
-        Column("seconds", np.full(len(counts), outcome.seconds), "s", "time of the whole batch"),
-    )
-    return Table(_TABLE, columns, f"{batch.part}, cases {batch.first} and {batch.count - 1} more", command=_COMMAND)
-
-
-def _read(path: Path) -> Iterator[LawCount]:
-    table = read_table(path, _TABLE)
-    rows = zip(*(table[name] for name in ("law", "checked", "failures", "worst", "tolerance")), strict=True)
-    for law, checked, failures, value, tolerance in rows:
-        yield LawCount(str(law), int(checked), int(failures), LawResidual(str(law), float(value), float(tolerance)))

@@ -6,7 +6,6 @@ hand, limits of a device, two rooms) are stored as a table with the seeds that d
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -24,20 +23,19 @@ from reports.by_name import function_named
 from reports.store import read_run, write_run
 from reports.store.impact import BrokenImpact, read_broken_impact, write_broken_impact
 from reports.store.io import opened
-from reports.store.keys import code_version, hash_of, plain, sources_hash
-from reports.store.tables import TABLE_FORMAT, Column, Table, read_table, write_table
+from reports.store.keys import code_version, hash_of, sources_hash
+from reports.store.tables import TABLE_FORMAT, read_record, write_record
 from verification.impacts import ImpactCase
 from verification.laws import bounds
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, PARTS, UNEQUAL, Found, Subject, drawn, residuals
-from verification.laws.counterexample import Struck, as_test
+from verification.laws.counterexample import as_test
 from verification.laws.engine import ENGINE_LAWS
 from verification.laws.equality import LAWS, UNEQUAL_LAWS
 from verification.laws.trajectories import judge_run
 
 ENGINE = "iapb:resolve_impact"
 BOUNDS = ("FACTORED", "KIT")  # tolerances, by their names in verification.laws.bounds
-_TABLE = "counterexample"
 
 
 @dataclass(frozen=True)
@@ -73,27 +71,17 @@ def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) ->
     path = folder / f"{found.part.replace(' ', '_')}-{found.index:09d}-{found.law}.h5"
     if found.run is not None:
         return write_run(path, found.run, replace=True)
-    if found.struck is not None:
-        _write_fclib(path.with_suffix(".hdf5"), found.struck.case)
-        return write_broken_impact(path, _broken_impact(found, found.struck, request))
-    record = {**_origin(found, request), "law": found.law, "value": found.residual.value,
-              "tolerance": found.residual.tolerance, "case": plain(asdict(found.case))}  # fmt: skip
-    columns = (Column("json", (json.dumps(record),), "1", "law, tolerances and input as JSON"),)
-    command = recheck_command(Path(path.name), request.resolver)
-    return write_table(path, Table(_TABLE, columns, found.law, command=command))
-
-
-def _origin(found: Found, request: CampaignRequest) -> dict[str, Any]:
-    """Return the part, index and request with which the case can be drawn again."""
-    return {"part": found.part, "index": found.index, "request": asdict(request)}
-
-
-def _broken_impact(found: Found, struck: Struck, request: CampaignRequest) -> BrokenImpact:
+    origin = {"part": found.part, "index": found.index, "request": asdict(request)}  # to draw the case again
+    if found.struck is None:
+        record = {**origin, "law": found.law, "value": found.residual.value, "tolerance": found.residual.tolerance,
+                  "case": found.case}  # fmt: skip
+        return write_record(path, record, found.law, command=recheck_command(Path(path.name), request.resolver))
+    _write_fclib(path.with_suffix(".hdf5"), found.struck.case)
     subject = request.subject()
-    return BrokenImpact(
-        struck, ENGINE if found.law in ENGINE_LAWS else request.resolver, found.law,
+    return write_broken_impact(path, BrokenImpact(
+        found.struck, ENGINE if found.law in ENGINE_LAWS else request.resolver, found.law,
         (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law].statement, found.residual.value, found.residual.tolerance,
-        _origin(found, request), as_test(struck.case, found.law, subject.bounds, subject.resolver))  # fmt: skip
+        origin, as_test(found.struck.case, found.law, subject.bounds, subject.resolver)))  # fmt: skip
 
 
 def _write_fclib(path: Path, case: ImpactCase) -> None:
@@ -127,20 +115,20 @@ def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResi
     RunFileError
         The file is absent, damaged, or not a counterexample.
     """
-    if not path.is_file():
-        raise RunFileError(f"{path}: no such file")
-    try:
-        with opened(path, TABLE_FORMAT):
-            pass
-    except RunFileError:
-        broken = read_broken_impact(path)
-        if broken is None:
-            yield from _recheck_run(path)
-        else:
-            yield _judged(path, broken.law, broken.found, broken.struck.case, allow_code)
-        return
-    record = json.loads(read_table(path, _TABLE)["json"][0])
-    yield _judged(path, str(record["law"]), record, None, allow_code)
+    with opened(path, expected_format=None) as file:
+        is_record = file.attrs.get("format") == TABLE_FORMAT
+    broken = None if is_record else read_broken_impact(path)
+    if is_record:
+        record = read_record(path)
+        yield _judged(path, str(record["law"]), record, None, allow_code)
+    elif broken is not None:
+        yield _judged(path, broken.law, broken.found, broken.struck.case, allow_code)
+    else:  # the laws on the stored arrays, then on the same scene simulated again
+        run = read_run(path)
+        yield from ((f"as recorded: {law}", residual) for law, residual in judge_run(run))
+        world, _, rendering = run.world.partition(" ")
+        again = run_world(scene_from_text(run.scene_source), world, rendering or "full", partial=True)
+        yield from ((f"simulated again: {law}", residual) for law, residual in judge_run(again))
 
 
 def _judged(path: Path, law: str, origin: dict[str, Any], case: Any, allow_code: bool) -> tuple[str, LawResidual]:
@@ -161,12 +149,3 @@ def _judged(path: Path, law: str, origin: dict[str, Any], case: Any, allow_code:
         return law, found[law]
     return (f"{law} (by {ENGINE}; {request.resolver}, which the file names, is code that --allow-code runs)",
             found[law])  # fmt: skip
-
-
-def _recheck_run(path: Path) -> Iterator[tuple[str, LawResidual]]:
-    """Check the laws on the stored arrays, then on the same scene simulated again."""
-    run = read_run(path)
-    yield from ((f"as recorded: {law}", residual) for law, residual in judge_run(run))
-    world, _, rendering = run.world.partition(" ")
-    again = run_world(scene_from_text(run.scene_source), world, rendering or "full", partial=True)
-    yield from ((f"simulated again: {law}", residual) for law, residual in judge_run(again))

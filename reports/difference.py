@@ -82,12 +82,10 @@ def compare_reports(old: ReportNumbers, new: ReportNumbers, tolerance: float = T
     cells = [cell for name, table in old.tables.items() if name in new.tables
              for cell in _cells(name, table, new.tables[name], tolerance)]  # fmt: skip
     runs = {command: new.runs[command] == content for command, content in old.runs.items() if command in new.runs}
-    return Difference(
-        tuple(cells), *(tuple(name for name in first.tables if name not in second.tables)
-                        for first, second in ((old, new), (new, old))),
-        sum(runs.values()), tuple(command for command, same in runs.items() if not same),
-        len(set(old.runs) ^ set(new.runs)),
-    )  # fmt: skip
+    alone = [tuple(name for name in first.tables if name not in second.tables)
+             for first, second in ((old, new), (new, old))]  # fmt: skip
+    return Difference(tuple(cells), alone[0], alone[1], sum(runs.values()),
+                      tuple(command for command, same in runs.items() if not same), len(set(old.runs) ^ set(new.runs)))
 
 
 def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cell]:

@@ -9,6 +9,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
@@ -43,7 +44,7 @@ def collect_provenance(
     packages
         Further packages whose versions are stated, besides those that every result depends on.
     """
-    facts = dict(_facts())
+    facts = _facts().copy()
     facts["seeds"] = ", ".join(str(seed) for seed in seeds) or "none"
     facts["command"] = current_command() if command is None else command
     if threads is not None:
@@ -55,24 +56,21 @@ def collect_provenance(
 
 
 def current_command() -> str:
-    """Return the command line of this process; absolute paths are cut to their last part."""
+    """Return the command line of this process; paths that are absolute or contain ".." are cut to their last part."""
+    def portable(word: str) -> str:
+        option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
+        path = Path(value)
+        return f"{option}{equals}{path.name}" if path.is_absolute() or ".." in path.parts else word
+
     program = Path(sys.argv[0])
     name = "iapb" if program.resolve() == _ROOT / "reports" / "cli.py" else program.name  # as python -m reports.cli
-    return shlex.join([name or "python", *(_without_place(word) for word in sys.argv[1:])])
-
-
-def _without_place(word: str) -> str:
-    """Return an argument; of a path that is absolute or contains "..", only its last part, as the rest is local."""
-    option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
-    path = Path(value)
-    leads_out = path.is_absolute() or ".." in path.parts
-    return f"{option}{equals}{path.name}" if leads_out else word
+    return shlex.join([name or "python", *map(portable, sys.argv[1:])])
 
 
 @cache
-def _facts() -> tuple[tuple[str, str], ...]:
+def _facts() -> dict[str, str]:
     """Return the facts that do not change while the process runs."""
-    facts = {
+    return {
         "version": package_version("iapb"),
         "commit": _git("rev-parse", "HEAD") or UNKNOWN,
         "dirty": _dirty(),
@@ -82,26 +80,15 @@ def _facts() -> tuple[tuple[str, str], ...]:
         "cpu": processor(),
         "blas": linear_algebra(),
         "simd": dispatched(),
+        **{package: package_version(package) for package in _PACKAGES},
     }
-    facts.update({package: package_version(package) for package in _PACKAGES})
-    return tuple(facts.items())
 
 
 def package_version(package: str) -> str:
     """Return the version of an installed package, or ``unknown``."""
-    if package == "siconos":
-        return _siconos_version()
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return UNKNOWN
-
-
-def _siconos_version() -> str:
-    """Return the version of Siconos from its adapter: Siconos runs in the system's Python, not in this one."""
-    try:
-        return find_simulator("siconos").version()
-    except MissingDependencyError:
+    try:  # Siconos runs in the system's Python, not in this one: its adapter knows the version
+        return find_simulator("siconos").version() if package == "siconos" else version(package)
+    except (PackageNotFoundError, MissingDependencyError):
         return UNKNOWN
 
 
@@ -167,13 +154,13 @@ def this_machine() -> str:
     return machine_of({"cpu": processor(), "blas": linear_algebra(), "simd": dispatched()})
 
 
+# Files that can change a result; changes of other files are ignored.
+_TRACED = ("iapb", "reference", "verification", "reports", "scenes", "requirements.lock", "pyproject.toml")
+
+
 def _dirty() -> str:
     status = _git("status", "--porcelain", "--", *_TRACED)
     return UNKNOWN if status is None else str(bool(status)).lower()
-
-
-# Files that can change a result; changes of other files are ignored.
-_TRACED = ("iapb", "reference", "verification", "reports", "scenes", "requirements.lock", "pyproject.toml")
 
 
 def uncommitted_changes() -> str | None:
@@ -192,10 +179,8 @@ def _git(*arguments: str, fine: tuple[int, ...] = (0,)) -> str | None:
     """Return git's output for the checkout; None without git or checkout, or if the exit status is not in `fine`."""
     if not (_ROOT / ".git").exists():
         return None
-    try:
-        done = subprocess.run(
-            ["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, timeout=20, check=False
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return done.stdout.strip() if done.returncode in fine else None
+    with suppress(OSError, subprocess.SubprocessError):
+        done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, timeout=20,
+                              check=False)  # fmt: skip
+        return done.stdout.strip() if done.returncode in fine else None
+    return None

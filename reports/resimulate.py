@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
@@ -31,7 +32,7 @@ COUPLINGS: dict[str, Any] = {kind.name: kind for kind in (NoCoupling, FourChanne
 
 
 @dataclass(frozen=True)
-class Difference:
+class Change:
     """One result that differs between the stored and the repeated run, and how.
 
     largest : largest absolute difference of the numbers; infinite if they cannot be subtracted (different shapes, or a
@@ -53,7 +54,7 @@ class Repetition:
     file: str
     stored: str
     again: str
-    differs: tuple[Difference, ...]
+    differs: tuple[Change, ...]
 
     @property
     def same(self) -> bool:
@@ -89,17 +90,12 @@ def law_of(run: Run) -> Any:
         module, name = LAWS[run.law]
         kind = getattr(import_module(module), name)
         return kind(**_known(kind, run.law_settings))
-    law = _law_of_world(run.world)
+    law = find_world(run.world).law if run.world in WORLDS else None
     law = law.within(scene_of(run)) if hasattr(law, "within") else law
     if law is None or (law.name, dict(law.settings)) != (run.law, dict(run.law_settings)):
         raise ArgumentError("law", run.law,
                             one_of(run.law, LAWS) + ", or the law of a world; other laws are not stored in the file")
     return law
-
-
-def _law_of_world(name: str) -> Any:
-    """Return the law of a world of reference/worlds.py; None if there is no such world."""
-    return find_world(name).law if name in WORLDS else None
 
 
 def coupling_of(run: Run) -> Coupling:
@@ -118,32 +114,28 @@ def _known(kind: Any, settings: Any) -> dict[str, Any]:
     return {name: value for name, value in settings.items() if name in names}
 
 
-def differences(stored: Run, again: Run) -> tuple[Difference, ...]:
+def differences(stored: Run, again: Run) -> tuple[Change, ...]:
     """Return every result that is not equal bit for bit; there is none if the content hashes are equal."""
     heads, arrays = (result_head(stored), result_head(again)), (dict(results_of(stored)), dict(results_of(again)))
-    found = [_difference(name, *(head[name] for head in heads)) for name in heads[0]]
+    found = [Change(name, f"is {heads[1][name]}, was {old}") for name, old in heads[0].items()
+             if canonical_json(old) != canonical_json(heads[1][name])]  # fmt: skip
     for name in dict.fromkeys([*arrays[0], *arrays[1]]):
         if any(name not in side for side in arrays):
-            found.append(Difference(name, "only stored" if name in arrays[0] else "only simulated again"))
+            found.append(Change(name, "only stored" if name in arrays[0] else "only simulated again"))
         else:
-            found.append(_array_difference(name, *(np.asarray(side[name]) for side in arrays)))
-    return tuple(one for one in found if one is not None)
+            found.extend(_changes(name, *(np.asarray(side[name]) for side in arrays)))
+    return tuple(found)
 
 
-def _difference(name: str, stored: Any, again: Any) -> Difference | None:
-    same = canonical_json(stored) == canonical_json(again)
-    return None if same else Difference(name, f"is {again}, was {stored}")
-
-
-def _array_difference(name: str, stored: np.ndarray, again: np.ndarray) -> Difference | None:
+def _changes(name: str, stored: np.ndarray, again: np.ndarray) -> Iterator[Change]:
     if (stored.shape, stored.dtype) != (again.shape, again.dtype):
-        return Difference(name, f"is {again.dtype} {again.shape}, was {stored.dtype} {stored.shape}")
-    if stored.tobytes() == again.tobytes():
-        return None
-    other = stored != again  # true for NaN on both sides
-    a, b = stored[other].astype(float), again[other].astype(float)
-    bits = np.isnan(a) & np.isnan(b)
-    if np.all(bits):
-        return Difference(name, "in bits that no comparison of numbers shows (the sign of a zero, a NaN)", 0.0)
-    largest = float(np.max(np.nan_to_num(np.abs(a[~bits] - b[~bits]), nan=np.inf)))
-    return Difference(name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest)
+        yield Change(name, f"is {again.dtype} {again.shape}, was {stored.dtype} {stored.shape}")
+    elif stored.tobytes() != again.tobytes():
+        other = stored != again  # true for NaN on both sides
+        a, b = stored[other].astype(float), again[other].astype(float)
+        bits = np.isnan(a) & np.isnan(b)
+        if np.all(bits):
+            yield Change(name, "in bits that no comparison of numbers shows (the sign of a zero, a NaN)", 0.0)
+            return
+        largest = float(np.max(np.nan_to_num(np.abs(a[~bits] - b[~bits]), nan=np.inf)))
+        yield Change(name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest)

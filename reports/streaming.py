@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -80,34 +81,38 @@ class _Stream:
         self._next = time.monotonic() + PAUSE
 
     def run(self, resume: bool, progress: Any) -> Streamed:
+        key, code, entry = self.place.key, code_label(), None
         try:
             resumed_at = self._go_on() if resume else 0
             stopped = record(self.recorder, self.total, progress, self._between)
             if self.log is None:
-                return Streamed(self._store_held(stopped), stopped, 0, False)
-            self._spill()
-            parts = parts_of(self.log.path, self.joiner, self.world, self.log.steps)
-            if stopped:
-                store_parts(self.place.partial, parts, stopped=stopped, key=self.place.key, replace=True)
-                return Streamed(None, stopped, resumed_at, self.simulation.keeps_no_state)
-            entry = store_parts(self.place.path, parts, key=self.place.key, code=code_label())
-            self.place.partial.unlink(missing_ok=True)
-            self.log.close(remove=True)
-            self.log = None
-            return Streamed(entry, "", resumed_at, False)
+                run = self.recorder.run(self.world, stopped)
+                if stopped:
+                    store_run(self.place.partial, run, key=key, replace=True)
+                else:
+                    entry = store_run(self.place.path, run, key=key, code=code)
+            else:
+                self._spill()
+                parts = parts_of(self.log.path, self.joiner, self.world, self.log.steps)
+                if stopped:
+                    store_parts(self.place.partial, parts, stopped=stopped, key=key, replace=True)
+                else:
+                    entry = store_parts(self.place.path, parts, key=key, code=code)
+            if not stopped:
+                self.place.partial.unlink(missing_ok=True)
+                self._forget()
+            resumable = bool(stopped) and self.log is not None and self.simulation.keeps_no_state
+            return Streamed(entry, stopped, resumed_at, resumable)
         finally:
             if self.log is not None:
                 self.log.close()
 
-    def _store_held(self, stopped: str) -> RunEntry | None:
-        run = self.recorder.run(self.world, stopped)
-        if stopped:
-            store_run(self.place.partial, run, key=self.place.key, replace=True)
-            return None
-        entry = store_run(self.place.path, run, key=self.place.key, code=code_label())
-        self.place.partial.unlink(missing_ok=True)
-        _forget(log_of(self.place.path))
-        return entry
+    def _forget(self) -> None:
+        """Remove the log, also one that an earlier attempt left, unless another process is writing it."""
+        path, log, self.log = log_of(self.place.path), self.log, None
+        with suppress(LogLocked):
+            if log is not None or path.is_file():
+                (log or RunLog(path, {}, anew=False)).close(remove=True)
 
     def _between(self) -> None:
         """Between two chunks, append the held chunks to the log if they exceed HELD bytes, or if a state is due."""
@@ -125,21 +130,18 @@ class _Stream:
     def _spill(self) -> None:
         """Append the held chunks that are not yet in the log; it is safe to repeat this if Ctrl-C interrupts it."""
         if self.log is None:
-            self.log = self._open()
+            head = log_head(self.simulation, self.world, self.total, key=self.place.key, code=code_label())
+            try:
+                self.log = RunLog(log_of(self.place.path), head)
+            except LogLocked:
+                said = f"{self.place.path}: another process is computing this run; wait for it"
+                raise RunFileError(said) from None
         first = self.recorder.first
         for chunk, size, seconds in self.recorder.held():
             if first >= self.log.steps:
                 self.log.write_chunk(chunk, size, seconds)
             first += size
         self.recorder.forget()
-
-    def _open(self) -> RunLog:
-        """Return the emptied log in the run's place."""
-        head = log_head(self.simulation, self.world, self.total, key=self.place.key, code=code_label())
-        try:
-            return RunLog(log_of(self.place.path), head)
-        except LogLocked:
-            raise RunFileError(f"{self.place.path}: another process is computing this run; wait for it") from None
 
     def _go_on(self) -> int:
         """Restore the last state in the log; return its step, 0 if there is none."""
@@ -172,12 +174,6 @@ def log_head(simulation: Simulation, world: str, total: int, **more: Any) -> dic
     })  # fmt: skip
 
 
-def lengths_of(recorder: Recorder) -> dict[str, int]:
-    """Return the lengths of the dimensions that depend on the scene."""
-    names = ("coordinate", "velocity", "device_coordinate", "device_velocity")
-    return dict(zip(names, recorder.coordinates, strict=True))
-
-
 def parts_of(path: Path, joiner: Recorder, world: str, steps: int = 0, more: int = 0,
              rows: list[Any] | None = None) -> Iterator[Run]:
     """Yield the run in a log in parts.
@@ -190,7 +186,8 @@ def parts_of(path: Path, joiner: Recorder, world: str, steps: int = 0, more: int
     RunFileError
         The log has fewer complete steps.
     """
-    lengths, held = lengths_of(joiner), 0
+    names, held = ("coordinate", "velocity", "device_coordinate", "device_velocity"), 0
+    lengths = dict(zip(names, joiner.coordinates, strict=True))
     for block in read_log(path)[1]:
         if block.line["kind"] == CHUNK and block.line["steps"]:
             chunk, own = record_of(path, block, lengths, more)
@@ -235,13 +232,3 @@ def simulation_of(head: Mapping[str, Any]) -> Simulation:
     """Return the simulation of a log in its initial state."""
     run: Any = SimpleNamespace(**head)  # it has the names of a Run's
     return Simulation(scene_of(run), law_of(run), coupling_of(run))
-
-
-def _forget(log: Path) -> None:
-    """Remove a log that an earlier attempt left, unless another process is writing it."""
-    if log.is_file():
-        try:
-            RunLog(log, {}, anew=False).close(remove=True)
-        except LogLocked:
-            return
-

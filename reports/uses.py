@@ -51,20 +51,17 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
 
     The values in the command are checked: parsed as the command parses them, they must give the scene to the last bit.
     """
-    shipped = _shipped(scene.name)
-    if shipped is None:
+    if scene.name not in scene_names():
         return ""
-    wanted, again = scene.resolved(), shipped.resolved()
+    wanted, again = scene.resolved(), _shipped(scene.name).resolved()
     sets = [f"{path}={json.dumps(value)}" for path, value in changes(again, wanted)]
     try:
         for path, value in parsed(sets).items():
             set_value(again, path, value)
     except IapbError:
         return ""
-    if again != wanted:
-        return ""
     words = ["iapb", "run", scene.name, *(word for text in sets for word in ("--set", text)), "--world", world]
-    return shlex.join(words + (["--rendering", rendering] if rendering != "full" else []))
+    return shlex.join(words + ["--rendering", rendering] * (rendering != "full")) if again == wanted else ""
 
 
 def parsed(assignments: list[str] | None) -> dict[str, Any]:
@@ -83,39 +80,24 @@ def parsed(assignments: list[str] | None) -> dict[str, Any]:
 
 
 @cache
-def _shipped(name: str) -> Scene | None:
-    return load_scene(find_scene(name)) if name in scene_names() else None
+def _shipped(name: str) -> Scene:
+    return load_scene(find_scene(name))
 
 
 def changes(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield (dotted path, new value) for each difference of two resolved scenes, at the deepest possible path."""
-    if old == new:
-        return
-    steps = _steps(old, new)
-    if steps is None:
-        yield path, new
-        return
-    for step in steps:
-        yield from changes(old[step], new[step], f"{path}.{_name(new, step)}".lstrip("."))
+    """Yield (dotted path, new value) for each difference of two resolved scenes, at the deepest possible path.
 
-
-def _steps(old: Any, new: Any) -> list[Any] | None:
-    """Return the keys or indices that both values have; None if a path cannot go deeper."""
-    if isinstance(old, Mapping) and isinstance(new, Mapping) and list(old) == list(new):
-        return list(new)
+    A list whose items do not all have different names can only be set as a whole.
+    """
     if isinstance(old, list) and isinstance(new, list) and _names(new) and _names(old) == _names(new):
-        return list(range(len(new)))
-    return None
+        old, new = (dict(zip(_names(items), items, strict=True)) for items in (old, new))
+    if isinstance(old, Mapping) and isinstance(new, Mapping) and list(old) == list(new):
+        for step in new:
+            yield from changes(old[step], new[step], f"{path}.{step}".lstrip("."))
+    elif old != new:
+        yield path, new
 
 
 def _names(items: list[Any]) -> list[str]:
-    """Return the names of a list's items; an empty list unless all items have different names.
-
-    A list without such names can only be set as a whole.
-    """
     names = [item["name"] for item in items if isinstance(item, Mapping) and item.get("name")]
     return names if len(set(names)) == len(items) else []
-
-
-def _name(place: Any, step: Any) -> str:
-    return str(step) if isinstance(place, Mapping) else str(place[step]["name"])

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,10 @@ from reports.provenance import collect_provenance, this_machine
 from reports.runner import Runner
 from reports.store.io import mark_store
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
-from reports.store.tables import Column, Table, read_table, write_table
+from reports.store.tables import read_record, write_record
 from reports.uses import UsedRun, add_use
 from verification.finding import Failure
 
-_RECORDS = "records"
 _LAYOUT = 3  # of the files: 2 had the rows of tables as columns
 
 
@@ -65,30 +65,22 @@ class Stage:
 
         adapter = TypeAdapter(self._kind)
         if self.path.is_file():
-            content = json.loads(read_table(self.path, _RECORDS)["json"][0])
+            content = read_record(self.path)
             self.runs = {run["file"]: UsedRun(**run | {"used_by": tuple(run["used_by"])}) for run in content["runs"]}
-            if runner is not None:
-                for run in self.runs.values():
-                    add_use(runner.used, run)
+            for run in self.runs.values() if runner is not None else ():
+                add_use(runner.used, run)
             return adapter.validate_python(content["records"])
-        records = self._computed(compute, runner)
-        text = json.dumps({"runs": plain(list(self.runs.values())), "records": plain(records)}, ensure_ascii=False)
-        read_back = adapter.validate_python(json.loads(text)["records"])  # raises before a wrong record is written
+        with runner.recording(self.name.replace("_", " ")) if runner is not None else nullcontext({}) as used:
+            records = compute()
+        self.runs = dict(used)
+        content = {"runs": list(self.runs.values()), "records": plain(records)}
+        read_back = adapter.validate_python(json.loads(json.dumps(content["records"])))  # raises for a wrong record
         self.failures += getattr(records, "failures", ())
         incomplete = self.path.with_name(f"{self.path.stem}-incomplete.h5")
         incomplete.unlink(missing_ok=True)
         if self.failures:
             self.path = incomplete
         mark_store(self.path.parent)
-        column = Column("json", (text,), "1", "the records, and the runs that they were made from, as JSON")
-        table = Table(_RECORDS, (column,), f"Records of the stage {self.name}", tuple(self.runs), "iapb reproduce")
-        write_table(self.path, table, collect_provenance() | {SOURCES: evidence_version()})
+        write_record(self.path, content, f"Records of the stage {self.name}", runs=tuple(self.runs),
+                     command="iapb reproduce", provenance=collect_provenance() | {SOURCES: evidence_version()})
         return read_back
-
-    def _computed(self, compute: Callable[[], Any], runner: Runner | None) -> Any:
-        if runner is None:
-            return compute()
-        with runner.recording(self.name.replace("_", " ")) as used:
-            records = compute()
-        self.runs = dict(used)
-        return records

@@ -9,23 +9,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from iapb.errors import ArgumentError, RunFileError
+from reports.store import io
 from reports.store.folder import PARTIAL_SUFFIX
-from reports.store.io import (
-    MARK_NAME,
-    WRITING,
-    abandoned,
-    is_aside,
-    is_locked,
-    is_old,
-    is_ours,
-    is_store,
-    opened,
-    remove_unless_locked,
-)
+from reports.store.io import MARK_NAME, WRITING, is_aside, is_locked, is_old, is_ours, is_store, opened
 from reports.store.keys import SOURCES, evidence_version, is_older_engine
 from reports.store.logs import LOG_SUFFIX, is_log, read_log
 from reports.store.runs import opened_run, read_provenance
@@ -84,8 +75,7 @@ def _state(path: Path) -> FileState:
     if path.name.endswith(DAMAGED_SUFFIX):
         return FileState(path, LEFTOVER, "set aside as damaged")
     try:
-        with opened(path, expected_format=None) as file:
-            kind = str(file.attrs.get("format", ""))
+        kind, _ = _kind_and_code(path)
         if kind == FORMAT:
             with opened_run(path) as (run, _):
                 if path.name.endswith(PARTIAL_SUFFIX) or not run.complete:
@@ -100,10 +90,14 @@ def _state(path: Path) -> FileState:
 def is_run(path: Path) -> bool:
     """Return whether a file is a run or a damaged file of iapb; tables and foreign files are not."""
     try:
-        with opened(path, expected_format=None) as file:
-            return file.attrs.get("format") == FORMAT
+        return _kind_and_code(path)[0] == FORMAT
     except RunFileError:
         return is_ours(path)
+
+
+def _kind_and_code(path: Path) -> tuple[str, str]:
+    with opened(path, expected_format=None) as file:
+        return str(file.attrs.get("format", "")), str(file.attrs.get("code", ""))
 
 
 def stores_below(folder: Path | str) -> tuple[Path, ...]:
@@ -147,14 +141,13 @@ def garbage(folder: Path | str) -> tuple[FileState, ...]:
 
 
 def _garbage(store: Path) -> Iterator[FileState]:
-    for path in abandoned(store):
+    for path in io.abandoned(store):
         yield FileState(path, LEFTOVER, "a writer was stopped before it was done")
     for path in _files(store):
         if path.parent != store or path.is_symlink():
             continue
-        if is_log(path):
-            if is_old(path) and not is_locked(path) and (why := _useless(path)):
-                yield FileState(path, LEFTOVER, why)
+        if is_log(path) and is_old(path) and not is_locked(path) and (why := _useless(path)):
+            yield FileState(path, LEFTOVER, why)
         if path.name.endswith(WRITING) or not is_ours(path):
             continue
         if path.name.endswith(DAMAGED_SUFFIX):
@@ -170,25 +163,22 @@ def _useless(log: Path) -> str:
     """Return why a log cannot be used to resume a run; "" if it can."""
     if _is_whole(log.with_name(log.name.removesuffix(LOG_SUFFIX))):
         return "the log of a run that is finished"
-    try:
+    with suppress(RunFileError):
         return "the log of a run of older code" if is_older_engine(str(read_log(log)[0].get("code", ""))) else ""
-    except RunFileError:
-        return ""
+    return ""
 
 
 def _stale(path: Path) -> str:
     """Return "run" or "table" if an older version of iapb made the file; "" for all other files and damaged ones."""
-    try:
-        with opened(path, expected_format=None) as file:
-            kind, code = file.attrs.get("format"), str(file.attrs.get("code", ""))
+    with suppress(RunFileError):
+        kind, code = _kind_and_code(path)
         if kind == FORMAT:
             return "run" if is_older_engine(code) else ""
         return "table" if read_provenance(path).get(SOURCES, evidence_version()) != evidence_version() else ""
-    except RunFileError:
-        return ""
+    return ""
 
 
 def collect_garbage(found: Iterable[FileState]) -> None:
     """Remove the files that `garbage` has found."""
     for state in found:
-        remove_unless_locked(state.path)
+        io.remove_unless_locked(state.path)

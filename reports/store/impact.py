@@ -3,12 +3,8 @@
 The laws are tested on impacts given only by numbers, M, J, v and e, without a scene. So the run has no step, no
 configuration, no body and no contact point. It has only its first state with the velocity before the impact, and in
 /impacts the velocity after it, once for each row budget that the law tests. Unknown values are marked: the rank is −1,
-the number of closing rows is counted or −1, the clamp is NaN, the unit of a velocity is 1. Group /struck has the rest:
-
-    mass_matrix (d, d), contact_jacobian (c, d), velocity (d,), restitution (c,)   the input
-    velocity_after (k, d), residual, tolerance                                     the result
-    translations (t, d)                                                            motions z with J z = 0, if known
-    law, statement, found, test                                                    texts: `found` is JSON
+the number of closing rows is counted or −1, the clamp is NaN, the unit of a velocity is 1. The text /struck has the
+`BrokenImpact` as JSON, every digit.
 """
 
 from __future__ import annotations
@@ -21,17 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from iapb.errors import RunFileError
 from iapb.run import ContactTable, ImpactTable, Run, digests
 from iapb.schema import blank, quantities
-from reports.store.io import opened, read_values, write_quantity, write_scale, write_text
+from reports.store.io import opened, read_values, write_text
+from reports.store.keys import plain
 from reports.store.runs import write_run
 from verification.impacts import Floats, ImpactCase
 from verification.laws.counterexample import Struck
 
 STRUCK = "struck"
 _SOURCE = "# An impact of bare numbers, no scene: see the group /struck of this file.\n"
-_TEXTS = ("law", "statement", "found", "test")
 
 
 @dataclass(frozen=True)
@@ -59,7 +54,8 @@ class BrokenImpact:
 
 def write_broken_impact(path: Path, broken: BrokenImpact) -> Path:
     """Write one run file; the same impact again gives the same file."""
-    return write_run(path, impact_run(broken), replace=True, more=lambda file: _write(file, broken))
+    text = json.dumps(plain(broken), ensure_ascii=False)
+    return write_run(path, impact_run(broken), replace=True, more=lambda file: write_text(file, STRUCK, text))
 
 
 def impact_run(broken: BrokenImpact) -> Run:
@@ -108,31 +104,6 @@ def _energy_lost(mass: Floats, before: Floats, after: Floats) -> float:
         return np.inf if lost > 0 else -np.inf
 
 
-def _write(file: Any, broken: BrokenImpact) -> None:
-    group, case = file.create_group(STRUCK), broken.struck.case
-    e = np.atleast_1d(np.asarray(case.given_restitution(), np.float64))
-    lengths = {"equation": case.coordinates, "coordinate": case.coordinates, "contact": case.contacts,
-               "given": len(e), "answer": len(broken.struck.rows)}  # fmt: skip
-    if case.translations is not None:
-        lengths["translation"] = len(case.translations)
-    for name, length in lengths.items():
-        write_scale(group, name, np.arange(length), "1")
-    write_quantity(group, "mass_matrix", case.mass_matrix, ("equation", "coordinate"), "1", "M")
-    write_quantity(group, "contact_jacobian", case.contact_jacobian, ("contact", "coordinate"), "1", "J, a row each")
-    write_quantity(group, "velocity", case.velocity, ("coordinate",), "1", "v before")
-    write_quantity(group, "restitution", e, ("given",), "1", "one for all rows, or one for each")
-    after = broken.struck.velocity_after
-    write_quantity(group, "velocity_after", after, ("answer", "coordinate"), "1", "v after, as the resolver gave it")
-    if case.translations is not None:
-        write_quantity(group, "translations", case.translations, ("translation", "coordinate"), "1", "z with J z = 0")
-    group.attrs.update({"residual": broken.value, "tolerance": broken.tolerance, "family": case.family,
-                        "one_restitution": case.unequal is None, "equal_restitution": case.restitution,
-                        "complaint": broken.struck.complaint, "resolver": broken.resolver})  # fmt: skip
-    for name in _TEXTS:
-        value = getattr(broken, name)
-        write_text(group, name, value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, indent=1))
-
-
 def read_broken_impact(path: Path | str) -> BrokenImpact | None:
     """Return the broken impact in a run file, or None for a run of another kind.
 
@@ -144,25 +115,11 @@ def read_broken_impact(path: Path | str) -> BrokenImpact | None:
     with opened(path) as file:
         if STRUCK not in file:
             return None
-        group, place = file[STRUCK], str(path)
-        texts = {name: read_values(group, name, place) for name in _TEXTS}
-        arrays = {name: np.asarray(read_values(group, name, place), np.float64) for name in
-                  ("mass_matrix", "contact_jacobian", "velocity", "restitution", "velocity_after")}  # fmt: skip
-        moves = read_values(group, "translations", place) if "translations" in group else None
-        head = dict(group.attrs)
-        rows = tuple(int(x) for x in read_values(file["impacts"], "rows", place))
-        return _broken(texts, arrays, moves, head, rows, place)
-
-
-def _broken(texts: dict[str, str], arrays: dict[str, Any], moves: Any, head: dict[str, Any], rows: tuple[int, ...],
-            place: str) -> BrokenImpact:
-    after, e, found = arrays.pop("velocity_after"), arrays.pop("restitution"), json.loads(texts["found"])
-    d = len(arrays["velocity"])
-    shapes = (arrays["mass_matrix"].shape, arrays["contact_jacobian"].shape[1:], after.shape)
-    if shapes != ((d, d), (d,), (len(rows), d)) or not {"part", "index", "request"} <= set(found):
-        raise RunFileError(f"{place}: /{STRUCK} is no impact")
-    case = ImpactCase(**arrays, restitution=float(head["equal_restitution"]), family=str(head["family"]),
-                      translations=moves, unequal=None if head["one_restitution"] else e)  # fmt: skip
-    return BrokenImpact(Struck(case, rows, after, str(head["complaint"])), str(head["resolver"]), texts["law"],
-                        texts["statement"], float(head["residual"]), float(head["tolerance"]), found,
-                        texts["test"])  # fmt: skip
+        told = json.loads(read_values(file, STRUCK, str(path)))
+        struck, case = told["struck"], told["struck"]["case"]
+        rows, d = tuple(map(int, struck["rows"])), len(case["velocity"])
+        shapes = {"mass_matrix": (d, d), "contact_jacobian": (-1, d), "translations": (-1, d), "touching": (-1, d)}
+        arrays = {name: np.array(value, np.float64).reshape(shapes.get(name, np.shape(value)))
+                  for name, value in case.items() if isinstance(value, list)}  # fmt: skip
+        after = np.array(struck["velocity_after"], np.float64).reshape(len(rows), d)
+        return BrokenImpact(**told | {"struck": Struck(ImpactCase(**case | arrays), rows, after, struck["complaint"])})

@@ -46,7 +46,6 @@ _HEAD = 1 << 16  # bytes, among which the attributes of a file are
 _BLOCK = 1 << 20
 # Chunks of about this size: small enough to look at a part, large enough to compress.
 _CHUNK_BYTES = 1 << 17
-_COMPRESSION_LEVEL = 4
 _MOST_PACKED = 1100  # largest expansion factor: deflate makes at most 1032 bytes of one
 _UNPACKED_SMALL = 1 << 20  # bytes that any dataset may state
 
@@ -75,7 +74,13 @@ def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
         if replace:
             os.replace(aside, target)
         else:
-            _move_if_absent(aside, target)
+            try:
+                os.link(aside, target)  # fails when the target exists, unlike a rename
+            except FileExistsError:
+                return
+            except OSError:  # a file system without hard links
+                if not target.exists():
+                    os.rename(aside, target)
         sync(target.parent)
     finally:
         aside.unlink(missing_ok=True)
@@ -83,7 +88,7 @@ def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
 
 
 def _locked(path: Path) -> int:
-    """Open a file and lock it until it is closed or the process ends; wait if `is_locked` holds the lock briefly."""
+    """Open a file and lock it until it is closed or the process ends; wait if `_held` holds the lock briefly."""
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -93,48 +98,36 @@ def _locked(path: Path) -> int:
         os.close(file)  # another process removed it as the file of a killed writer
 
 
+@contextmanager
+def _held(path: Path) -> Iterator[bool | None]:
+    """Lock a file, so that no process can start to write it; yield False if one does, None if it cannot be opened."""
+    try:
+        file = os.open(path, os.O_RDWR)
+    except OSError:
+        yield None
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        free = True
+    except OSError:
+        free = False
+    try:
+        yield free
+    finally:
+        os.close(file)
+
+
 def is_locked(path: Path) -> bool:
     """Return whether a process is writing a file and holds its lock; False if the file does not exist."""
-    try:
-        file = os.open(path, os.O_RDWR)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return False
-    except OSError:
-        return True
-    finally:
-        os.close(file)
+    with _held(path) as free:
+        return free is False
 
 
-def remove_unless_locked(path: Path) -> bool:
-    """Remove a file if no process is writing it; return whether it was removed.
-
-    The file is locked meanwhile, so that no process can start to write it.
-    """
-    try:
-        file = os.open(path, os.O_RDWR)
-    except OSError:
-        return not path.exists()
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        path.unlink(missing_ok=True)
-        return True
-    except OSError:
-        return False
-    finally:
-        os.close(file)
-
-
-def _move_if_absent(aside: Path, target: Path) -> None:
-    try:
-        os.link(aside, target)  # fails when the target exists, unlike a rename
-    except FileExistsError:
-        return
-    except OSError:  # a file system without hard links
-        if not target.exists():
-            os.rename(aside, target)
+def remove_unless_locked(path: Path) -> None:
+    """Remove a file if no process is writing it."""
+    with _held(path) as free, suppress(OSError):
+        if free:
+            path.unlink(missing_ok=True)
 
 
 def mark_store(folder: Path) -> None:
@@ -162,16 +155,13 @@ def is_old(path: Path) -> bool:
 
 
 def abandoned(folder: Path) -> list[Path]:
-    """Return the temporary files that killed writers left in a store.
-
-    They are recognised by name and content. Files that are still being written are younger and locked.
-    """
+    """Return the temporary files that killed writers left in a store, by name and content; not those still written."""
     found = sorted(folder.glob(f".*{WRITING}")) if is_store(folder) else []
-    return [path for path in found if is_aside(path) and is_plain(path) and is_old(path) and not is_locked(path)
+    return [path for path in found if is_aside(path) and _is_plain(path) and is_old(path) and not is_locked(path)
             and _is_draft(path)]
 
 
-def is_plain(path: Path) -> bool:
+def _is_plain(path: Path) -> bool:
     """Return whether a path is a regular file with this name alone: no link, pipe or folder."""
     with suppress(OSError):
         found = path.lstat()
@@ -181,8 +171,7 @@ def is_plain(path: Path) -> bool:
 
 def _is_draft(path: Path) -> bool:
     """Return whether a temporary file is empty or begins like a run, table or mark of iapb."""
-    with path.open("rb") as file:
-        head = file.read(_HEAD)
+    head = _ends(path)[0]
     ours = _MARK_HEAD in head if path.name.startswith(f".{MARK_NAME}") else head.startswith(b"{")
     return not head or _says_so(head) or (".h5" not in path.name and ours)
 
@@ -203,13 +192,18 @@ def is_ours(path: Path) -> bool:
 
     It ends with a seal or, where damage took the seal, its HDF5 head has our attribute `format` and its name a run key.
     """
-    if not is_plain(path):
+    if not _is_plain(path):
         return False
+    head, end = _ends(path)
+    return end.startswith(_MARK) or (_KEYED.fullmatch(path.name) is not None and _says_so(head))
+
+
+def _ends(path: Path) -> tuple[bytes, bytes]:
+    """Return the head of a file, and as many last bytes as a seal has."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
         file.seek(max(path.stat().st_size - _LENGTH, 0))
-        end = file.read()
-    return end.startswith(_MARK) or (_KEYED.fullmatch(path.name) is not None and _says_so(head))
+        return head, file.read()
 
 
 def sealed(content: bytes) -> bytes:
@@ -217,15 +211,12 @@ def sealed(content: bytes) -> bytes:
     return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
-def check_seal(path: Path) -> None:
+def _check_seal(path: Path) -> None:
     """Raise RunFileError unless `path` is an HDF5 file whose every byte agrees with its seal."""
-    with path.open("rb") as file:
-        if file.read(len(_HDF5_SIGNATURE)) != _HDF5_SIGNATURE:
-            raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
+    head, mark = _ends(path)
+    if not head.startswith(_HDF5_SIGNATURE):
+        raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
     size = path.stat().st_size - _LENGTH
-    with path.open("rb") as file:
-        file.seek(max(size, 0))
-        mark = file.read()
     if size < 0 or not mark.startswith(_MARK):
         raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb")
     if mark != _MARK + _checksum(path, size).encode() + b"\n":
@@ -243,10 +234,11 @@ def _checksum(path: Path, size: int) -> str:
 
 
 @contextmanager
-def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
+def new_file(path: Path, *, replace: bool, large: bool = False) -> Iterator[Any]:
     """Yield an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` atomically.
 
-    It is filled in memory, so that a disk error occurs in our own write and not inside the HDF5 library.
+    It is filled in memory, so that a disk error occurs in our own write and not inside the HDF5 library. A `large` file
+    may exceed the memory and is filled on disk.
 
     Raises
     ------
@@ -255,30 +247,17 @@ def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
     """
     import h5py
 
-    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
-        yield file
-        file.flush()
-        image = file.id.get_file_image()
+    if not large:
+        with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+            yield file
+            file.flush()
+            image = file.id.get_file_image()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with written_aside(path, replace=replace) as aside:
-            aside.write_bytes(sealed(image))
-    except OSError as error:
-        why = error.strerror or error
-        raise RunFileError(f"{path}: cannot be written: {why}; the previous file is unchanged") from error
-
-
-@contextmanager
-def new_large_file(path: Path, *, replace: bool) -> Iterator[Any]:
-    """Yield an HDF5 file to fill that may be larger than memory; apart from that, it works like `new_file`.
-
-    It is filled on disk, so disk errors come from the HDF5 library.
-    """
-    import h5py
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with written_aside(path, replace=replace) as aside:
+            if not large:
+                aside.write_bytes(sealed(image))
+                return
             with h5py.File(aside, "w", rdcc_nbytes=2 * _CHUNK_BYTES, locking=False) as file:
                 yield file
             mark = _MARK + _checksum(aside, aside.stat().st_size).encode() + b"\n"
@@ -305,30 +284,26 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
     if not path.is_file():
         what = "a folder, not a file" if path.is_dir() else "no regular file" if path.exists() else "no such file"
         raise RunFileError(f"{path}: {what}")
-    check_seal(path)
+    _check_seal(path)
     try:
         with h5py.File(path, "r") as file:
             if outside := leads_out(file):
                 raise RunFileError(f"{path}: {outside}: expected a file without links to other files")
-            if expected_format is not None:
-                _check_format(file, path, expected_format)
+            found = file.attrs.get("format")
+            if expected_format not in (None, found):
+                raise RunFileError(f"{path}: format is {found!r}: expected {expected_format!r}")
+            version = int(file.attrs.get("format_version", 0)) if expected_format else FORMAT_VERSION
+            if version != FORMAT_VERSION:
+                other, more = "a later iapb", ""
+                if version < FORMAT_VERSION:
+                    other, more = "an earlier iapb", "; simulate the run again, it will be stored beside this file"
+                raise RunFileError(f"{path}: format version is {version}, of {other}: this one reads {FORMAT_VERSION}"
+                                   + more)
             yield file
     except RunFileError:
         raise
     except Exception as error:  # sealed, but made by other software: any error is possible
         raise RunFileError(f"{path}: cannot be read as {expected_format or 'a file of iapb'}: {error}") from error
-
-
-def _check_format(file: Any, path: Path, expected: str) -> None:
-    found = file.attrs.get("format")
-    if found != expected:
-        raise RunFileError(f"{path}: format is {found!r}: expected {expected!r}")
-    version = int(file.attrs.get("format_version", 0))
-    if version > FORMAT_VERSION:
-        raise RunFileError(f"{path}: format version is {version}, of a later iapb: this one reads {FORMAT_VERSION}")
-    if version < FORMAT_VERSION:
-        raise RunFileError(f"{path}: format version is {version}, of an earlier iapb: this one reads {FORMAT_VERSION}; "
-                           "simulate the run again, it will be stored beside this file")
 
 
 def write_text(group: Any, name: str, text: str) -> None:
@@ -347,33 +322,17 @@ def write_values(group: Any, name: str, values: Any, *, growing: bool = False) -
 
     array = np.asarray(values)
     if array.dtype.kind in "UO" or (array.size == 0 and isinstance(values, tuple)):
-        texts = [str(value) for value in values]
-        return group.create_dataset(name, data=np.array(texts, object), dtype=h5py.string_dtype("utf-8"))
+        texts = np.array([str(value) for value in values], object)
+        return group.create_dataset(name, data=texts, dtype=h5py.string_dtype("utf-8"))
     if array.dtype == np.bool_:
         array = array.astype(np.uint8)  # netCDF has no truth values
-    return group.create_dataset(
-        name,
-        data=array,
-        chunks=_chunk_shape(array, growing),
-        maxshape=_largest_shape(array, growing),
-        compression="gzip",
-        compression_opts=_COMPRESSION_LEVEL,
-        shuffle=True,
-        fletcher32=True,
-    )
-
-
-def _chunk_shape(array: np.ndarray, growing: bool) -> tuple[int, ...]:
-    width = max(int(np.prod(array.shape[1:])) * array.itemsize, 1)
-    most = max(_CHUNK_BYTES // width, 1)
-    rows = most if growing else min(most, max(array.shape[0], 1))
-    return (rows, *(max(length, 1) for length in array.shape[1:]))
-
-
-def _largest_shape(array: np.ndarray, growing: bool) -> tuple[int | None, ...]:
+    rows = max(_CHUNK_BYTES // max(int(np.prod(array.shape[1:])) * array.itemsize, 1), 1)
+    largest: tuple[int | None, ...] = (None,) * array.ndim if array.size == 0 else array.shape
     if growing:
-        return (None, *(length or None for length in array.shape[1:]))
-    return (None,) * array.ndim if array.size == 0 else array.shape
+        largest = (None, *(length or None for length in array.shape[1:]))
+    chunks = (rows if growing else min(rows, max(array.shape[0], 1)), *(max(length, 1) for length in array.shape[1:]))
+    return group.create_dataset(name, data=array, chunks=chunks, maxshape=largest, compression="gzip",
+                                compression_opts=4, shuffle=True, fletcher32=True)  # fmt: skip
 
 
 def extend(dataset: Any, values: Any) -> None:
@@ -396,8 +355,7 @@ def write_quantity(
 ) -> Any:
     """Write one quantity; `group` must already have the scales of its dimensions."""
     dataset = write_values(group, name, values, growing=growing)
-    dataset.attrs["units"] = unit
-    dataset.attrs["long_name"] = meaning
+    dataset.attrs.update({"units": unit, "long_name": meaning})
     for axis, dimension in enumerate(dimensions):
         dataset.dims[axis].attach_scale(group[dimension])
     return dataset

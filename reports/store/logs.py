@@ -18,6 +18,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from math import prod
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,7 +29,6 @@ from numpy.typing import NDArray
 
 from iapb.errors import RunFileError
 from iapb.recording import LINES
-from iapb.schema import Quantity
 from reports.store.io import sync
 
 LOG_SUFFIX = ".log"
@@ -117,19 +117,15 @@ class RunLog:
 
     def _write(self, line: Mapping[str, Any], numbers: bytes) -> None:
         """Write a line and its numbers at the end; after a failed write, the next write overwrites them."""
-        seal = _seal_of(self._seal, line, numbers)
-        self.end = self._put(self.end, _line({**line, _SEAL: seal}) + numbers)
-        self._seal = seal
-
-    def _put(self, place: int, content: bytes) -> int:
-        view = memoryview(content)
+        seal, place = _seal_of(self._seal, line, numbers), self.end
+        view = memoryview(_line({**line, _SEAL: seal}) + numbers)
         try:
             while view:
                 done = os.pwrite(self._file, view, place)
                 place, view = place + done, view[done:]
         except OSError as error:
             raise self._failed(error) from error
-        return place
+        self.end, self._seal = place, seal
 
     def _failed(self, error: OSError) -> RunFileError:
         return RunFileError(f"{self.path}: cannot be written: {error.strerror or error}; --resume goes on from the "
@@ -149,9 +145,7 @@ def _line(record: Mapping[str, Any]) -> bytes:
 def _seal_of(before: str, line: Mapping[str, Any], numbers: bytes) -> str:
     """Return the seal of a block: sha256 of the previous seal `before`, the line and its numbers."""
     unsealed = {name: value for name, value in line.items() if name != _SEAL}
-    digest = hashlib.sha256(before.encode() + _line(unsealed))
-    digest.update(numbers)
-    return digest.hexdigest()
+    return hashlib.sha256(before.encode() + _line(unsealed) + numbers).hexdigest()
 
 
 def is_log(path: Path) -> bool:
@@ -176,9 +170,9 @@ def read_log(path: Path) -> tuple[dict[str, Any], Iterator[Block]]:
     with path.open("rb") as file:
         head = _parsed(file.readline(_LONGEST_LINE))
         first = file.tell()
-    if head is not None and head.get("format_version") != _VERSION:
+    if head.get("format_version", _VERSION) != _VERSION:
         raise RunFileError(f"{path}: format version is not {_VERSION}; run without --resume")
-    if head is None or head.get(_SEAL) != _seal_of("", head, b""):
+    if head.get(_SEAL) != _seal_of("", head, b""):
         raise RunFileError(f"{path}: its first line is damaged, so the log cannot be read; run without --resume")
     return {name: value for name, value in head.items() if name not in _OWN}, _blocks_from(path, first, head[_SEAL])
 
@@ -188,36 +182,30 @@ def _blocks_from(path: Path, start: int, before: str) -> Iterator[Block]:
     size = path.stat().st_size
     with path.open("rb") as file:
         file.seek(start)
-        while (line := _parsed(file.readline(_LONGEST_LINE))) is not None:
-            if not _is_block(line) or line["bytes"] > size - file.tell():
-                return
+        while _is_block(line := _parsed(file.readline(_LONGEST_LINE))) and line["bytes"] <= size - file.tell():
             numbers = file.read(line["bytes"])
             if line.get(_SEAL) != _seal_of(before, line, numbers):
                 return
-            block = Block(line, numbers, start, file.tell())
-            yield block
-            start, before = block.end, line[_SEAL]
+            yield Block(line, numbers, start, file.tell())
+            start, before = file.tell(), line[_SEAL]
 
 
 def is_damaged(path: Path) -> bool:
     """Return whether a log has more than complete blocks and one block cut off by a kill or a full disk."""
-    end = 0
-    for block in read_log(path)[1]:
-        end = block.end
-    rest = path.stat().st_size - end
+    end = max((block.end for block in read_log(path)[1]), default=0)
     with path.open("rb") as file:
         file.seek(end)
-        text = file.readline(_LONGEST_LINE)
-    line = _parsed(text) or {}
-    return text.endswith(b"\n") and not (_is_block(line) and line["bytes"] > rest - len(text))
+        text, line = (found := file.readline(_LONGEST_LINE)), _parsed(found)
+        return text.endswith(b"\n") and not (_is_block(line) and line["bytes"] > path.stat().st_size - file.tell())
 
 
-def _parsed(text: bytes) -> dict[str, Any] | None:
+def _parsed(text: bytes) -> dict[str, Any]:
+    """Return the mapping in a line; an empty one if the line is incomplete or something else."""
     try:
         found = json.loads(text) if text.endswith(b"\n") else None
     except (ValueError, RecursionError):
-        return None
-    return found if isinstance(found, dict) else None
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def _is_block(line: Mapping[str, Any]) -> bool:
@@ -233,26 +221,13 @@ def record_of(path: Path, block: Block, lengths: Mapping[str, int], more: int = 
     """
     steps, contacts, impacts = (int(block.line[name]) for name in ("steps", "contacts", "impacts"))
     rows = {**lengths, "time": steps, "step": steps, "contact": contacts, "impact": impacts, "axis": 3}
-    numbers, place = block.numbers, 0
-
-    def column(shape: Sequence[int], dtype: Any) -> NDArray[Any]:
-        nonlocal place
-        found = np.frombuffer(numbers, dtype, prod(shape), place).reshape(shape)
-        place += found.nbytes
-        return found
-
-    def columns(listed: Sequence[Quantity]) -> Any:
-        return SimpleNamespace(
-            **{each.name: column([rows[name] for name in each.dimensions], each.dtype) for each in listed})
-
-    try:
-        record = SimpleNamespace(used=(steps, contacts, impacts), **{name: columns(LINES[name]) for name in LINES})
-        own = column((steps, more), np.float64)
-    except ValueError as error:
-        raise RunFileError(f"{path}: the chunk at byte {block.start} belongs to another scene") from error
-    if place != len(numbers):
-        raise RunFileError(f"{path}: the chunk at byte {block.start} belongs to another scene")
-    return record, own
+    listed = [(name, each.name, [rows[dimension] for dimension in each.dimensions], each.dtype)
+              for name in LINES for each in LINES[name]]  # fmt: skip
+    columns = _split(path, block, "chunk", [*((shape, dtype) for *_, shape, dtype in listed), ([steps, more], float)])
+    tables: dict[str, Any] = {name: SimpleNamespace() for name in LINES}
+    for (name, column, *_), values in zip(listed, columns, strict=False):
+        setattr(tables[name], column, values)
+    return SimpleNamespace(used=(steps, contacts, impacts), **tables), columns[-1]
 
 
 def put_back(path: Path, block: Block, arrays: Sequence[NDArray[Any]]) -> None:
@@ -263,9 +238,16 @@ def put_back(path: Path, block: Block, arrays: Sequence[NDArray[Any]]) -> None:
     RunFileError
         The state belongs to another scene.
     """
-    numbers, place = block.numbers, 0
-    if len(numbers) != sum(array.nbytes for array in arrays):
-        raise RunFileError(f"{path}: the state at byte {block.start} belongs to another scene")
-    for array in arrays:
-        array[...] = np.frombuffer(numbers, array.dtype, array.size, place).reshape(array.shape)
-        place += array.nbytes
+    stored = _split(path, block, "state", [(array.shape, array.dtype) for array in arrays])
+    for array, values in zip(arrays, stored, strict=True):
+        array[...] = values
+
+
+def _split(path: Path, block: Block, what: str, layout: Sequence[tuple[Sequence[int], Any]]) -> list[NDArray[Any]]:
+    """Return the numbers of a block as arrays of these shapes and types, which must use all its bytes."""
+    sizes = [prod(shape) * np.dtype(dtype).itemsize for shape, dtype in layout]
+    if sum(sizes) != len(block.numbers):
+        raise RunFileError(f"{path}: the {what} at byte {block.start} belongs to another scene")
+    places = accumulate(sizes, initial=0)
+    return [np.frombuffer(block.numbers, dtype, prod(shape), place if size else 0).reshape(shape)
+            for (shape, dtype), size, place in zip(layout, sizes, places, strict=False)]  # fmt: skip

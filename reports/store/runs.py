@@ -14,12 +14,12 @@ import numpy as np
 
 from iapb.errors import RunFileError
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, coordinates_of, energy_dimension, unit_of
+from iapb.schema import Quantity
 from reports.provenance import collect_provenance
 from reports.store.io import (
     dataset_of,
     extend,
     new_file,
-    new_large_file,
     opened,
     read_values,
     write_quantity,
@@ -37,10 +37,13 @@ from reports.store.schema import (
     TEXTS,
 )
 
+Reader = Callable[[Any, str, str], Any]  # (group, name, path): `read_values` or `dataset_of`
+TIME = Quantity("time", ("time",), np.float64, "s", "")
+
 
 @dataclass(frozen=True)
 class RunEntry:
-    """The description of a run in its file, without arrays; it is also a line of the index."""
+    """The description of a run in its file, without arrays."""
 
     file: str  # name within the folder
     title: str  # scene and world
@@ -50,12 +53,7 @@ class RunEntry:
 
 
 def write_run(
-    path: Path | str,
-    run: Run,
-    *,
-    key: str = "",
-    provenance: Mapping[str, str] | None = None,
-    replace: bool = False,
+    path: Path | str, run: Run, *, key: str = "", provenance: Mapping[str, str] | None = None, replace: bool = False,
     more: Callable[[Any], None] | None = None,
 ) -> Path:
     """Write one run to a temporary file, sync it, and move it to `path` atomically.
@@ -78,14 +76,8 @@ def write_run(
 
 
 def store_run(
-    path: Path | str,
-    run: Run,
-    *,
-    key: str,
-    code: str = "",
-    provenance: Mapping[str, str] | None = None,
-    replace: bool = False,
-    more: Callable[[Any], None] | None = None,
+    path: Path | str, run: Run, *, key: str, code: str = "", provenance: Mapping[str, str] | None = None,
+    replace: bool = False, more: Callable[[Any], None] | None = None,
 ) -> RunEntry:
     """Write one run like `write_run`, with the label of its code; return the entry of the new file."""
     path = Path(path)
@@ -105,7 +97,7 @@ def store_parts(
     `stopped` is the reason why the run is incomplete, or "".
     """
     path = Path(path)
-    with new_large_file(path, replace=replace) as file:
+    with new_file(path, replace=replace, large=True) as file:
         distrust: tuple[str, ...] = ()
         for number, part in enumerate(parts):
             distrust = distrust or part.distrust
@@ -115,109 +107,69 @@ def store_parts(
                 _append(file, part)
         file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
                            "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
-        file.attrs["content_hash"] = content_hash(_run_in(file, path))
+        file.attrs["content_hash"] = content_hash(_run_in(file, path, dataset_of))
         return _entry(file, path)
+
+
+def _columns(run: Run) -> Iterator[tuple[str, Quantity, Any]]:
+    """Yield group, declaration and values of every array of a run."""
+    for group, (listed, record_of) in GROUPS.items():
+        yield from ((group, quantity, getattr(record_of(run), quantity.name)) for quantity in listed)
+    for name, values in run.energy.items():
+        meaning = name.replace("_", " ")
+        yield "energy", Quantity(name, (energy_dimension(run, name),), np.float64, "J", meaning), values
 
 
 def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str, str] | None, *,
                growing: bool = False) -> None:  # fmt: skip
-    _write_head(file, run, key, code)
+    file.attrs.update({
+        "format": FORMAT, "format_version": FORMAT_VERSION, "title": f"{run.scene_name} · {run.world}",
+        "status": "complete" if run.complete else "partial", "stopped": run.stopped, "run_key": key, "code": code,
+        "dt": float(run.dt), "tool_dofs": run.tool_dofs, "tool_coordinates": run.tool_coordinates,
+        **{name: json.dumps(getattr(run, name), ensure_ascii=False) for name in SENTENCES},
+    })  # fmt: skip
     for group, name, attribute in TEXTS:
         value = getattr(run, attribute)
-        write_text(file.require_group(group), name, _json(value) if attribute in JSON_TEXTS else value)
-    _write_names(file, run)
-    for group in GROUPS:
-        _write_group(file.create_group(group), group, run, growing)
-    _write_energy(file.create_group("energy", track_order=True), run, growing)
-    _write_effects(file.create_group("effects"), run)
-    file.create_group("provenance", track_order=True)
+        if attribute in JSON_TEXTS:
+            value = json.dumps(plain(value), ensure_ascii=False, indent=1)
+        write_text(file.require_group(group), name, value)
+    names = file.create_group("mechanism")
+    for dimension in ("coordinate", "velocity", "body"):
+        write_scale(names, dimension, getattr(run, f"{dimension}_names"), "1")
+    for dimension in ("coordinate", "velocity"):
+        units = getattr(run, f"{dimension}_units")
+        write_quantity(names, f"{dimension}_unit", units, (dimension,), "1", f"unit of each {dimension}")
+    for name in (*GROUPS, "energy", "effects", "provenance"):
+        file.create_group(name, track_order=name in ("energy", "provenance"))
+    for group, quantity, values in _columns(run):
+        for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
+            if dimension not in file[group]:
+                write_scale(file[group], dimension, *coordinates_of(run, dimension, length), growing=growing)
+        dataset = write_quantity(file[group], quantity.name, values, quantity.dimensions, unit_of(quantity, run),
+                                 quantity.meaning, growing=growing)  # fmt: skip
+        if quantity.name == "state":
+            dataset.attrs.update(STATE_ATTRIBUTES)
+    effects = file["effects"]
+    write_scale(effects, "effect", tuple(effect.name for effect in run.effects), "1")
+    active = np.array([effect.active for effect in run.effects], np.int8)
+    write_quantity(effects, "active", active, ("effect",), "1", "1 where the effect was on")
+    for name, meaning in (("reason", "why"), ("ignores", "field of the scene that the law ignored, or empty")):
+        texts = tuple(getattr(effect, name) for effect in run.effects)
+        write_quantity(effects, name, texts, ("effect",), "1", meaning)
     for name, text in (collect_provenance() if provenance is None else provenance).items():
         write_text(file["provenance"], name, text)
 
 
 def _append(file: Any, part: Run) -> None:
     """Append a part; its first state equals the last one in the file."""
-    for name, (quantities, record_of) in GROUPS.items():
-        group = file[name]
-        for quantity in quantities:
-            values = getattr(record_of(part), quantity.name)
-            if quantity.dimensions[0] == "step_edge":
-                values = values + group[quantity.name][-1]
-            extend(group[quantity.name], values[int(quantity.dimensions[0] in ("time", "step_edge")):])
-        _lengthen_scales(group, {each.dimensions[0]: each.name for each in quantities}, part)
-    energy = file["energy"]
-    dimensions = {energy_dimension(part, name): name for name in part.energy}
-    for name, values in part.energy.items():
-        extend(energy[name], values[int(energy_dimension(part, name) == "time"):])
-    _lengthen_scales(energy, dimensions, part)
-
-
-def _lengthen_scales(group: Any, dimensions: Mapping[str, str], part: Run) -> None:
-    """Extend the dimension scales of growing dimensions to the length of their quantities."""
-    for dimension, name in dimensions.items():
-        scale, length = group[dimension], len(group[name])
-        extend(scale, part.time[1:] if dimension == "time" else np.arange(len(scale), length))
-
-
-def _json(value: Any) -> str:
-    return json.dumps(plain(value), ensure_ascii=False, indent=1)
-
-
-def _write_head(file: Any, run: Run, key: str, code: str) -> None:
-    file.attrs["format"] = FORMAT
-    file.attrs["format_version"] = FORMAT_VERSION
-    file.attrs["title"] = f"{run.scene_name} · {run.world}"
-    file.attrs["status"] = "complete" if run.complete else "partial"
-    file.attrs["stopped"] = run.stopped
-    for name in SENTENCES:
-        file.attrs[name] = json.dumps(getattr(run, name), ensure_ascii=False)
-    file.attrs["run_key"] = key
-    file.attrs["code"] = code
-    file.attrs["dt"] = float(run.dt)
-    file.attrs["tool_dofs"] = run.tool_dofs
-    file.attrs["tool_coordinates"] = run.tool_coordinates
-
-
-def _write_names(file: Any, run: Run) -> None:
-    group = file.create_group("mechanism")
-    write_scale(group, "coordinate", run.coordinate_names, "1")
-    write_quantity(group, "coordinate_unit", run.coordinate_units, ("coordinate",), "1", "unit of each coordinate")
-    write_scale(group, "velocity", run.velocity_names, "1")
-    write_quantity(group, "velocity_unit", run.velocity_units, ("velocity",), "1", "unit of each velocity")
-    write_scale(group, "body", run.body_names, "1")
-
-
-def _write_group(group: Any, name: str, run: Run, growing: bool = False) -> None:
-    quantities, record_of = GROUPS[name]
-    record = record_of(run)
-    for quantity in quantities:
-        values = getattr(record, quantity.name)
-        for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
-            if dimension not in group:
-                write_scale(group, dimension, *coordinates_of(run, dimension, length), growing=growing)
-        dataset = write_quantity(
-            group, quantity.name, values, quantity.dimensions, unit_of(quantity, run), quantity.meaning, growing=growing
-        )
-        if quantity.name == "state":
-            dataset.attrs.update(STATE_ATTRIBUTES)
-
-
-def _write_energy(group: Any, run: Run, growing: bool = False) -> None:
-    for name, values in run.energy.items():
-        dimension = energy_dimension(run, name)
-        if dimension not in group:
-            write_scale(group, dimension, *coordinates_of(run, dimension, len(values)), growing=growing)
-        write_quantity(group, name, values, (dimension,), "J", name.replace("_", " "), growing=growing)
-
-
-def _write_effects(group: Any, run: Run) -> None:
-    write_scale(group, "effect", tuple(effect.name for effect in run.effects), "1")
-    active = [int(effect.active) for effect in run.effects]
-    reasons = tuple(effect.reason for effect in run.effects)
-    write_quantity(group, "active", np.array(active, np.int8), ("effect",), "1", "1 where the effect was on")
-    write_quantity(group, "reason", reasons, ("effect",), "1", "why")
-    ignores = tuple(effect.ignores for effect in run.effects)
-    write_quantity(group, "ignores", ignores, ("effect",), "1", "field of the scene that the law ignored, or empty")
+    for group, quantity, values in _columns(part):
+        along, dataset = quantity.dimensions[0], file[group][quantity.name]
+        if along == "step_edge":
+            values = values + dataset[-1]
+        extend(dataset, values[int(along in ("time", "step_edge")):])
+        scale = file[group][along]
+        if len(scale) < len(dataset):
+            extend(scale, part.time[1:] if along == "time" else np.arange(len(scale), len(dataset)))
 
 
 def read_run(path: Path | str) -> Run:
@@ -236,14 +188,14 @@ def read_run(path: Path | str) -> Run:
 def read_stored(path: Path | str) -> tuple[Run, RunEntry]:
     """Return the run in a file and the entry of the file; it raises the errors of `read_run`."""
     with opened(path) as file:
-        entry = _entry(file, path)
-        return _judged(Run(**_texts(file, path), **_head(file), **_arrays(file, path, read_values)), entry, path), entry
+        return _judged(file, path, read_values)
 
 
-def _judged(run: Run, entry: RunEntry, path: Path | str) -> Run:
+def _judged(file: Any, path: Path | str, read: Reader) -> tuple[Run, RunEntry]:
+    run, entry = _run_in(file, path, read), _entry(file, path)
     if content_hash(run) != entry.content_hash:
         raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
-    return run
+    return run, entry
 
 
 @contextmanager
@@ -253,12 +205,7 @@ def opened_run(path: Path | str) -> Iterator[tuple[Run, RunEntry]]:
     The file is checked like in `read_stored`, but in constant memory.
     """
     with opened(path) as file:
-        run, entry = _run_in(file, path), _entry(file, path)
-        yield _judged(run, entry, path), entry
-
-
-def _run_in(file: Any, path: Path | str) -> Run:
-    return Run(**_texts(file, path), **_head(file), **_arrays(file, path, dataset_of))
+        yield _judged(file, path, dataset_of)
 
 
 def read_provenance(path: Path | str) -> dict[str, str]:
@@ -307,56 +254,32 @@ def _entry(file: Any, path: Path | str) -> RunEntry:
     return RunEntry(Path(path).name, *(str(file.attrs[name]) for name in names))
 
 
-def _texts(file: Any, path: Path | str) -> dict[str, Any]:
-    texts = {}
-    for group, name, attribute in TEXTS:
-        text = read_values(file[group], name, str(path))
-        texts[attribute] = json.loads(text) if attribute in JSON_TEXTS else text
-    return texts
-
-
-def _range(ends: Any) -> tuple[int, int]:
-    start, stop = ends
-    return index(start), index(stop)
-
-
-def _head(file: Any) -> dict[str, Any]:
-    ranges = {name: _range(file.attrs[name]) for name in ("tool_dofs", "tool_coordinates")}
-    return {
-        "dt": float(file.attrs["dt"]),
-        "complete": file.attrs["status"] == "complete",
-        "stopped": str(file.attrs.get("stopped", "")),
-        **{name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES},
-        **ranges,
-    }
-
-
-def _arrays(file: Any, path: Path | str, read: Callable[[Any, str, str], Any]) -> dict[str, Any]:
-    """Return the names and arrays of a run; `read` is `read_values` (arrays in memory) or `dataset_of` (on disk)."""
+def _run_in(file: Any, path: Path | str, read: Reader) -> Run:
+    """Return the run in an open file; `read` is `read_values` (arrays in memory) or `dataset_of` (on disk)."""
     place = str(path)
-    group = {
-        name: {quantity.name: _numbers(read, file[name], quantity.name, place) for quantity in quantities}
-        for name, (quantities, _) in GROUPS.items()
-    }
-    for name, quantity in (("contacts", "is_new"), ("impacts", "solved")):  # truth values are stored as numbers
-        group[name][quantity] = _Truths(group[name][quantity])
-        if read is read_values:
-            group[name][quantity] = group[name][quantity][:]
-    return {
-        "coordinate_names": read_values(file["mechanism"], "coordinate", place),
-        "coordinate_units": read_values(file["mechanism"], "coordinate_unit", place),
-        "velocity_names": read_values(file["mechanism"], "velocity", place),
-        "velocity_units": read_values(file["mechanism"], "velocity_unit", place),
-        "body_names": read_values(file["mechanism"], "body", place),
-        "time": _numbers(read, file["trajectory"], "time", place),
-        "contacts": ContactTable(**group["contacts"]),
-        "impacts": ImpactTable(**group["impacts"]),
-        "energy": _energy(read, _group(file, "energy", place), place),
-        "effects": _effects(file["effects"], place),
-        **group["trajectory"],
-        **group["steps"],
-        **group["timings"],
-    }
+    texts = {attribute: read_values(file[group], name, place) for group, name, attribute in TEXTS}
+    tables = {group: {quantity.name: _numbers(read, file[group], quantity, place) for quantity in listed}
+              for group, (listed, _) in GROUPS.items()}  # fmt: skip
+    energy, effects, names = _group(file, "energy", path), file["effects"], file["mechanism"]
+    lists = [read_values(effects, name, place) for name in ("effect", "active", "reason")]
+    lists.append(read_values(effects, "ignores", place) if "ignores" in effects else ("",) * len(lists[0]))  # old files
+    return Run(
+        **texts | {attribute: json.loads(texts[attribute]) for attribute in JSON_TEXTS},
+        **{name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES},
+        **{name: tuple(map(index, file.attrs[name])) for name in ("tool_dofs", "tool_coordinates")},
+        **{f"{dimension}_names": read_values(names, dimension, place) for dimension in ("coordinate", "velocity",
+                                                                                        "body")},
+        **{f"{dimension}_units": read_values(names, f"{dimension}_unit", place)
+           for dimension in ("coordinate", "velocity")},
+        **tables["trajectory"], **tables["steps"], **tables["timings"],
+        dt=float(file.attrs["dt"]), complete=file.attrs["status"] == "complete",
+        stopped=str(file.attrs.get("stopped", "")), time=_numbers(read, file["trajectory"], TIME, place),
+        contacts=ContactTable(**tables["contacts"]), impacts=ImpactTable(**tables["impacts"]),
+        energy={name: _numbers(read, energy, TIME._replace(name=name), place)
+                for name in energy if not energy[name].is_scale},
+        effects=tuple(EffectRow(name, bool(on), reason, ignored)
+                      for name, on, reason, ignored in zip(*lists, strict=True)),
+    )  # fmt: skip
 
 
 class _Truths:
@@ -374,19 +297,11 @@ class _Truths:
         return np.asarray(self._numbers[rows]).astype(np.bool_)
 
 
-def _numbers(read: Callable[[Any, str, str], Any], group: Any, name: str, path: str) -> Any:
-    values = read(group, name, path)
+def _numbers(read: Reader, group: Any, quantity: Quantity, path: str) -> Any:
+    values = read(group, quantity.name, path)
     if not (hasattr(values, "dtype") and values.dtype.kind in "biuf" and values.ndim):
-        raise RunFileError(f"{path}: {group.name}/{name} is no list of numbers")
+        raise RunFileError(f"{path}: {group.name}/{quantity.name} is no list of numbers")
+    if quantity.dtype is np.bool_:
+        values = _Truths(values)
+        return values[:] if read is read_values else values
     return values
-
-
-def _energy(read: Callable[[Any, str, str], Any], group: Any, path: str) -> dict[str, Any]:
-    return {name: _numbers(read, group, name, path) for name in group if not group[name].is_scale}
-
-
-def _effects(group: Any, path: str) -> tuple[EffectRow, ...]:
-    names, active, reasons = (read_values(group, name, path) for name in ("effect", "active", "reason"))
-    ignores = read_values(group, "ignores", path) if "ignores" in group else ("",) * len(names)  # not in old files
-    rows = zip(names, active, reasons, ignores, strict=True)
-    return tuple(EffectRow(name, bool(on), reason, ignored) for name, on, reason, ignored in rows)

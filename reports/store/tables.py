@@ -9,7 +9,7 @@ rows unless it repeats values.
 from __future__ import annotations
 
 import hashlib
-import re
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,17 +24,17 @@ from reports.provenance import collect_provenance
 from reports.store.io import (
     extend,
     new_file,
-    new_large_file,
     opened,
     read_values,
     write_quantity,
     write_scale,
     write_text,
 )
-from reports.store.keys import add_array
+from reports.store.keys import add_array, plain
 from reports.store.schema import FORMAT_VERSION, TABLE_FORMAT
 
 ROW = "row"
+RECORDS = "records"  # name of the table of one text
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def growing_table(path: Path, others: Sequence[Table]) -> Iterator[Callable[[Tab
     All parts have the same name and the same columns; the first column increases. The result is the file that
     `write_tables` would write, but made in constant memory.
     """
-    with new_large_file(path, replace=True) as file:
+    with new_file(path, replace=True, large=True) as file:
         parts: list[Table] = []
 
         def append(part: Table) -> None:
@@ -227,6 +227,15 @@ def _read(group: Any, path: str) -> Table:
     return Table(group.name.strip("/"), columns, str(group.attrs["title"]), runs, str(group.attrs["command"]))
 
 
-def safe_name(text: str) -> str:
-    """Return a text as a valid name in a file."""
-    return re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_") or "table"
+def write_record(
+    path: Path, value: Any, title: str, *, runs: Sequence[str] = (), command: str = "",
+    provenance: Mapping[str, str] | None = None,
+) -> Path:
+    """Write any records as JSON, in a table of one text; see `plain` for the types."""
+    column = Column("json", (json.dumps(plain(value), ensure_ascii=False),), "1", "the records as JSON")
+    return write_table(path, Table(RECORDS, (column,), title, tuple(runs), command), provenance)
+
+
+def read_record(path: Path) -> Any:
+    """Return the records in a file as lists and mappings; it raises the errors of `read_table`."""
+    return json.loads(read_table(path, RECORDS)["json"][0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -125,22 +126,20 @@ def test_a_resolver_that_raises_leaves_no_velocity_and_its_words(tmp_path: Path)
     assert read_run(path).impacts.approaching.tolist() == [-1]
 
 
-@pytest.mark.parametrize("spoiled", ["mass_matrix", "velocity_after", "found", "residual", "contact_jacobian"])
+@pytest.mark.parametrize("spoiled", ["mass_matrix", "velocity_after", "value", "contact_jacobian", "struck"])
 def test_a_file_that_lacks_a_part_or_has_it_in_another_shape_is_refused(spoiled: str, kept: Path) -> None:
     import h5py
 
     with new_file(kept.with_name("spoiled.h5"), replace=True) as file, h5py.File(kept) as good:
         file.attrs.update(good.attrs)
-        for name in good:
-            good.copy(name, file)
-        group = file["struck"]
-        if spoiled == "residual":
-            del group.attrs[spoiled]
-        elif spoiled == "found":
-            group[spoiled][()] = "{}"
-        else:
-            del group[spoiled]
-            group[spoiled] = np.zeros(3)
+        told = json.loads(good["struck"].asstr()[()])
+        if spoiled == "value":
+            del told[spoiled]
+        elif spoiled in told["struck"]:
+            told["struck"][spoiled] = [0.0] * 3
+        elif spoiled != "struck":
+            told["struck"]["case"][spoiled] = [0.0] * 3
+        file["struck/law" if spoiled == "struck" else "struck"] = json.dumps(told)  # a group: of an earlier version
     with pytest.raises(RunFileError):
         read_broken_impact(kept.with_name("spoiled.h5"))
 
