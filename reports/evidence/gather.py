@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
@@ -11,13 +11,15 @@ from typing import Any
 
 from reports.evidence import claims, runs
 from reports.evidence.depends import depends_of
-from reports.evidence.manifest import manifest
 from reports.evidence.stage import Stage, evidence_version
 from reports.evidence.topics import TOPICS, compute_topic, failed_topic
 from reports.figures.two_link_arm import arm_energies
-from reports.pages.records import Evidence, FailedCases
-from reports.provenance import PEERS, collect_provenance
+from reports.pages.records import Evidence, FailedCases, StoredFile
+from reports.provenance import PEERS, collect_provenance, machine_of
 from reports.runner import Runner
+from reports.store.io import opened
+from reports.store.runs import read_provenance
+from reports.uses import UsedRun
 from verification import haptic_rate
 from verification.cost import effects
 from verification.cost.impacts import work_precision
@@ -38,6 +40,8 @@ SEEDS = {
     "power balance": "verification.mechanics.power_balance",
     "coordinates": "verification.mechanics.coordinate_invariance",
 }  # fmt: skip
+ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since
+UNNAMED = "the report"  # the user of a run that no claim, topic or figure requested
 SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link_arm_b", "arm_pushing")
 
 
@@ -80,6 +84,23 @@ def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
     """Return a topic, or a substitute that says why the topic could not be computed."""
     topic: Finding | None = kept.stage(name, Finding, lambda done, _: compute_topic(name, runner, depth, done), None)
     return failed_topic(name, kept.failures[name][-1]) if topic is None else topic
+
+
+def manifest(used: Mapping[str, UsedRun], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:
+    """Return one line per used run file and per table file, in the order of use; paths are relative to `out`."""
+    files = []
+    for run in used.values():
+        path, users = out / "runs" / run.file, run.used_by or (UNNAMED,)
+        status, made_on = (run.status, machine_of(read_provenance(path))) if path.is_file() else (ABSENT, "")
+        files.append(StoredFile(run.name, f"runs/{run.file}", run.key, run.content_hash, run.command, run.size, users,
+                                status, made_on))  # fmt: skip
+    for stage in stages:
+        with opened(stage.path, expected_format=None) as file:
+            content = str(file.attrs["content_hash"])
+        place, name = stage.path.relative_to(out).as_posix(), stage.name.replace("_", " ")
+        files.append(StoredFile(name, place, stage.key, content, "iapb reproduce", stage.path.stat().st_size,
+                                made_on=machine_of(read_provenance(stage.path))))  # fmt: skip
+    return tuple(files)
 
 
 def provenance() -> dict[str, str]:

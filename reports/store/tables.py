@@ -76,9 +76,7 @@ def write_table(path: Path | str, table: Table, provenance: Mapping[str, str] | 
     return write_tables(path, (table,), provenance)
 
 
-def write_tables(
-    path: Path | str, tables: Sequence[Table], provenance: Mapping[str, str] | None = None
-) -> Path:
+def write_tables(path: Path | str, tables: Sequence[Table], provenance: Mapping[str, str] | None = None) -> Path:
     """Write tables to one file atomically, each to its own group.
 
     Raises
@@ -87,9 +85,13 @@ def write_tables(
         The columns of a table differ in length, or two tables or two columns have the same name.
     """
     path = Path(path)
-    _check_names("tables", [table.name for table in tables])
+    if not _are_names([table.name for table in tables]):
+        raise ArgumentError("tables", [table.name for table in tables], "different names without '/'")
     for table in tables:
-        _check_columns(table)
+        names, lengths = [column.name for column in table.columns], [len(column.values) for column in table.columns]
+        if not _are_names(names) or len(set(lengths)) > 1 or ROW in names:
+            raise ArgumentError(f"columns of {table.name}", dict(zip(names, lengths, strict=True)),
+                                f"columns of one length, with different names without '/', none named {ROW!r}")
     with new_file(path, replace=True) as file:
         for table in tables:
             _write(file.create_group(table.name, track_order=True), table)
@@ -124,9 +126,7 @@ def growing_table(path: Path, others: Sequence[Table]) -> Iterator[Callable[[Tab
 
 
 def _write_head(file: Any, tables: Sequence[Table], provenance: Mapping[str, str] | None) -> None:
-    file.attrs.update(
-        {"default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION}
-    )
+    file.attrs.update({"default": tables[0].name, "format": TABLE_FORMAT, "format_version": FORMAT_VERSION})
     for name, text in (collect_provenance() if provenance is None else provenance).items():
         write_text(file.require_group("provenance"), name, text)
     file.attrs["content_hash"] = tables_hash(tables)
@@ -179,17 +179,8 @@ def _hashable(values: Any) -> Any:
     return array.astype(np.uint8) if array.dtype == np.bool_ else array
 
 
-def _check_names(argument: str, names: Sequence[str]) -> None:
-    if not names or len(set(names)) < len(names) or any("/" in name or not name for name in names):
-        raise ArgumentError(argument, list(names), "one or more different names without '/'")
-
-
-def _check_columns(table: Table) -> None:
-    _check_names("columns", [column.name for column in table.columns])
-    lengths = {len(column.values) for column in table.columns}
-    if len(lengths) > 1 or ROW in (column.name for column in table.columns):
-        shape = {column.name: len(column.values) for column in table.columns}
-        raise ArgumentError(f"columns of {table.name}", shape, f"columns of one length, none named {ROW!r}")
+def _are_names(names: Sequence[str]) -> bool:
+    return len(set(names)) == len(names) > 0 and all(name and "/" not in name for name in names)
 
 
 def _write(group: Any, table: Table, *, growing: bool = False) -> None:
@@ -205,24 +196,14 @@ def _write(group: Any, table: Table, *, growing: bool = False) -> None:
     for column in table.columns[1:] if distinct else table.columns:
         values = tuple(column.values) if _is_text(column.values) else column.values
         write_quantity(group, column.name, values, (dimension,), column.unit, column.description, growing=growing)
-    group.attrs["title"] = table.title
-    group.attrs["command"] = table.command
-    group.attrs["runs"] = "\n".join(table.runs)
+    group.attrs.update({"title": table.title, "command": table.command, "runs": "\n".join(table.runs)})
 
 
 def _read(group: Any, path: str) -> Table:
     if not hasattr(group, "keys"):  # iterating over a dataset in a table's place might never end
         raise RunFileError(f"{path}: {group.name} is no table")
-    columns = tuple(
-        Column(
-            name,
-            read_values(group, name, path),
-            str(group[name].attrs["units"]),
-            str(group[name].attrs["long_name"]),
-        )
-        for name in group
-        if name != ROW
-    )
+    columns = tuple(Column(name, read_values(group, name, path), str(group[name].attrs["units"]),
+                           str(group[name].attrs["long_name"])) for name in group if name != ROW)  # fmt: skip
     runs = tuple(str(group.attrs["runs"]).split("\n")) if group.attrs["runs"] else ()
     return Table(group.name.strip("/"), columns, str(group.attrs["title"]), runs, str(group.attrs["command"]))
 

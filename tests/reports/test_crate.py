@@ -16,7 +16,7 @@ from iapb.scene import find_scene, load_scene
 from reports import provenance, report
 from reports.crate import CRATE_NAME, PROFILE, sha256
 from reports.evidence import gather
-from reports.evidence.manifest import ABSENT, manifest
+from reports.evidence.gather import ABSENT, manifest
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, Panel, Recipe
 from reports.numbers_file import NUMBERS_NAME, read_numbers

@@ -79,14 +79,6 @@ def test_ctrl_c_in_a_run_stops_who_asked_for_it_and_keeps_what_was_done(keep, tm
     assert not list(tmp_path.glob("*.partial"))
 
 
-def test_who_asks_for_partial_runs_gets_them_and_they_are_not_taken_for_whole_ones_later(tmp_path):
-    runner = Runner(tmp_path, interrupt)
-    run = runner(PEG, "IAPB", partial=True)
-    assert not run.complete
-    with pytest.raises(KeyboardInterrupt):
-        runner(PEG, "IAPB")
-
-
 def test_claims_are_not_computed_from_interrupted_runs(tmp_path, monkeypatch):
     """Ctrl-C during the claims must not leave a verdict from half a run in the table of claims."""
     from reports.evidence import claims

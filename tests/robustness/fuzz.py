@@ -22,9 +22,9 @@ import time
 import traceback
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cache
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cache, partial
 from math import ceil, inf
 from multiprocessing import get_context
 from pathlib import Path
@@ -44,34 +44,17 @@ class TooLong(BaseException):
     """A case took longer than LONGEST. Not an Exception: no reader may catch it."""
 
 
-@dataclass(frozen=True)
-class Broken:
-    """A case that neither was read nor refused: which one, and what came instead.
-
-    file : where it was kept, or empty
-    """
-
-    kind: str
-    number: int
-    seed: int
-    how: str
-    file: str = ""
-
-
-@dataclass(frozen=True)
+@dataclass
 class FuzzRecord:
     """What came of the cases of one kind.
 
-    read : taken as valid; refused : refused by one of iapb's errors; broken : anything else
-    said : the shortest message of a refusal
+    read : taken as valid; refused : refused by one of iapb's errors; broken : anything else, the file and what came
     """
 
-    kind: str
-    tried: int
-    read: int
-    refused: int
-    broken: tuple[Broken, ...]
-    said: str
+    tried: int = 0
+    read: int = 0
+    refused: int = 0
+    broken: list[tuple[str, str]] = field(default_factory=list)
 
 
 def case(kind: Any, seed: int, number: int) -> tuple[str, bytes]:
@@ -96,25 +79,19 @@ def fuzz(
     seed : of all cases
     keep : folder for the cases that broke something, and how; None: not kept
     begin : called with the number of each case before it is tried
-
-    Returns
-    -------
-    FuzzRecord
     """
-    chosen, counts, said, broken = KINDS[kind], {READ: 0, REFUSED: 0}, "", []
-    with tempfile.TemporaryDirectory() as folder:
+    chosen, record = KINDS[kind], FuzzRecord()
+    with tempfile.TemporaryDirectory() as folder, bounded_memory():
         prepare(Path(folder))
-        with bounded_memory():
-            for number in numbers:
-                begin(number)
-                name, content = case(chosen, seed, number)
-                outcome, words = judge(chosen, Path(folder) / name, content)
-                if outcome == BROKEN:
-                    broken.append(Broken(kind, number, seed, words, kept(keep, kind, number, name, content, words)))
-                else:
-                    counts[outcome] += 1
-                said = min((said, words), key=lambda text: (not text, len(text)))
-    return FuzzRecord(kind, len(numbers), counts[READ], counts[REFUSED], tuple(broken), said)
+        for number in numbers:
+            begin(number)
+            name, content = case(chosen, seed, number)
+            outcome, words = judge(chosen, Path(folder) / name, content)
+            record.tried, record.read = record.tried + 1, record.read + (outcome == READ)
+            record.refused += outcome == REFUSED
+            if outcome == BROKEN:
+                record.broken.append((kept(keep, kind, number, name, content, words), words))
+    return record
 
 
 def judge(kind: Any, path: Path, content: bytes) -> tuple[str, str]:
@@ -188,42 +165,10 @@ def bounded_memory() -> Iterator[None]:
 _BATCH = 2000  # cases that one process tries
 _ROUNDS = 100
 _SHOWN = 5
-_SAID = 160  # characters of a message that the report shows
-_COLUMNS = ("input", "tried", "refused by name", "taken as valid", "traceback or hang", "the shortest refusal")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Try the cases; return 0 if none broke anything, else 1."""
-    options = _options(arguments)
-    chosen = [options.kind] if options.kind else list(KINDS)
-    shares = sum(KINDS[kind].share for kind in chosen)
-    sizes = {kind: ceil(options.cases * KINDS[kind].share / shares) for kind in chosen}
-    found: dict[str, list[FuzzRecord]] = {kind: [] for kind in chosen}
-    start = time.monotonic()
-    for turn in range(_ROUNDS):  # all kinds in turn, so that each is tried where time is short
-        for kind, size in sizes.items():
-            numbers = range(options.first + turn * size // _ROUNDS, options.first + (turn + 1) * size // _ROUNDS)
-            if numbers and time.monotonic() - start < 60.0 * options.minutes:
-                found[kind] += _records(kind, numbers, options.seed, options.keep)
-    rows = [_row(kind, records) for kind, records in found.items()]
-    broken = [one for records in found.values() for record in records for one in record.broken]
-    for kind, tried, refused, read, bad, _ in rows:
-        print(f"{kind:<22} {tried:>7} tried, {read:>6} read, {refused:>6} refused by name, {bad} broken", flush=True)
-    tried = sum(row[1] for row in rows)
-    print(f"{tried} cases of {len(chosen)} kinds in {time.monotonic() - start:.0f} s; {len(broken)} broken.")
-    for each in broken[:_SHOWN]:
-        print(f"{each.file}\n{each.how}")
-    return 1 if broken else 0
-
-
-def _row(kind: str, records: Sequence[FuzzRecord]) -> tuple[str, int, int, int, int, str]:
-    said = min((record.said for record in records), key=lambda text: (not text, len(text)), default="")
-    return (kind, sum(record.tried for record in records), sum(record.refused for record in records),
-            sum(record.read for record in records), sum(len(record.broken) for record in records),
-            " ".join(said.split())[:_SAID])  # fmt: skip
-
-
-def _options(arguments: list[str] | None) -> Any:
     parser = argparse.ArgumentParser(prog="python -m tests.robustness.fuzz", description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=100_000, help="in all, shared out among the kinds")
     parser.add_argument("--minutes", type=float, default=inf, help="after which no more are tried")
@@ -231,11 +176,28 @@ def _options(arguments: list[str] | None) -> Any:
     parser.add_argument("--first", type=int, default=0, help="number of the first case of each kind")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, default=Path("out/fuzz"), help="folder for what broke something")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    found = {kind: FuzzRecord() for kind in ([options.kind] if options.kind else KINDS)}
+    shares, start = sum(KINDS[kind].share for kind in found), time.monotonic()
+    for turn in range(_ROUNDS):  # all kinds in turn, so that each is tried where time is short
+        for kind, record in found.items():
+            size = ceil(options.cases * KINDS[kind].share / shares)
+            numbers = range(options.first + turn * size // _ROUNDS, options.first + (turn + 1) * size // _ROUNDS)
+            if numbers and time.monotonic() - start < 60.0 * options.minutes:
+                _try_in_children(kind, numbers, options.seed, options.keep, record)
+    for kind, record in found.items():
+        print(f"{kind:<22} {record.tried:>7} tried, {record.read:>6} read, {record.refused:>6} refused by name, "
+              f"{len(record.broken)} broken", flush=True)
+    broken = [one for record in found.values() for one in record.broken]
+    print(f"{sum(record.tried for record in found.values())} cases of {len(found)} kinds in "
+          f"{time.monotonic() - start:.0f} s; {len(broken)} broken.")
+    for file, how in broken[:_SHOWN]:
+        print(f"{file}\n{how}")
+    return 1 if broken else 0
 
 
-def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzRecord]:
-    """Yield a record per batch; where a process died, one for that case, and the rest of its batch is tried again."""
+def _try_in_children(kind: str, numbers: range, seed: int, keep: Path, sums: FuzzRecord) -> None:
+    """Try a batch per process; where one died, count that case, and try the rest of its batch again."""
     _warm(kind)
     batches = [numbers[at : at + _BATCH] for at in range(0, len(numbers), _BATCH)]
     while batches:
@@ -244,8 +206,10 @@ def _records(kind: str, numbers: range, seed: int, keep: Path) -> Iterator[FuzzR
         if record is None:
             at = batch.index(last)
             batches[:0] = [part for part in (batch[:at], batch[at + 1 :]) if part]
-            record = _died(kind, last, seed, keep, status)
-        yield record
+            how = f"the process ended with {status}"
+            record = FuzzRecord(1, broken=[(kept(keep, kind, last, *case(KINDS[kind], seed, last), how), how)])
+        for name in ("tried", "read", "refused", "broken"):
+            setattr(sums, name, getattr(sums, name) + getattr(record, name))
 
 
 @cache
@@ -265,32 +229,16 @@ def _in_child(kind: str, batch: range, seed: int, keep: Path) -> tuple[FuzzRecor
     child = context.Process(target=_try, args=(kind, batch, seed, keep, sender, at))
     child.start()
     sender.close()
-    record = _received(receiver)
+    record = None
+    with suppress(EOFError):
+        record = receiver.recv()
     child.join()
     return record, at.value, child.exitcode
 
 
 def _try(kind: str, batch: range, seed: int, keep: Path, sender: Any, at: Any) -> None:
-    def begin(number: int) -> None:
-        at.value = number
-
-    sender.send(fuzz(kind, batch, seed, keep, begin=begin))
+    sender.send(fuzz(kind, batch, seed, keep, begin=partial(setattr, at, "value")))
     sender.close()
-
-
-def _received(receiver: Any) -> FuzzRecord | None:
-    try:
-        found: FuzzRecord = receiver.recv()
-    except EOFError:
-        return None
-    return found
-
-
-def _died(kind: str, number: int, seed: int, keep: Path, status: int | None) -> FuzzRecord:
-    name, content = case(KINDS[kind], seed, number)
-    how = f"the process ended with {status}"
-    broken = Broken(kind, number, seed, how, kept(keep, kind, number, name, content, how))
-    return FuzzRecord(kind, 1, 0, 0, (broken,), how)
 
 
 if __name__ == "__main__":

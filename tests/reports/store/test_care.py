@@ -73,10 +73,6 @@ def damage(path: Path) -> None:
     path.write_bytes(bytes(content))
 
 
-def test_a_sound_store_is_whole(filled: Path) -> None:
-    assert set(states(filled).values()) == {WHOLE}
-
-
 def test_every_kind_of_file_is_told(filled: Path) -> None:
     import h5py
 
@@ -210,13 +206,6 @@ def test_a_store_is_marked_when_it_is_written_to(filled: Path) -> None:
     assert garbage(filled) == ()
 
 
-def test_a_file_cut_short_is_set_aside(filled: Path) -> None:
-    path = runs(filled)[0]
-    path.write_bytes(path.read_bytes()[:5000])
-    repair_store(filled)
-    assert not path.exists() and path.with_name(path.name + DAMAGED_SUFFIX).is_file()
-
-
 @pytest.mark.parametrize("world", ["IAPB", "PB", "ideal", "CBuc", "IAPB-friction"])
 def test_a_run_comes_out_the_same_from_its_own_file(tmp_path: Path, world: str) -> None:
     runner, scene = Runner(tmp_path), shipped_scene("peg_corner", {"duration": 0.2, "contact.friction": 0.2})
@@ -301,13 +290,6 @@ def test_a_run_that_cannot_be_made_again_costs_its_own_line(
     said = capsys.readouterr().out
     assert "mine.h5: not simulated again: law = 'mine'" in said and "table.h5" not in said
     assert f"{len(runs(filled))} of {len(runs(filled)) + 1} runs came out the same." in said
-
-
-def test_a_run_of_an_unknown_law_cannot_be_made_again(tmp_path: Path) -> None:
-    run = Runner(tmp_path)(shipped_scene("peg_corner", SHORT), "IAPB")
-    write_run(tmp_path / "mine.h5", replace(run, law="mine"))
-    with pytest.raises(ArgumentError, match="mine"):
-        repeat_run(tmp_path / "mine.h5")
 
 
 def test_a_law_of_ones_own_is_made_again_where_a_world_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
