@@ -13,11 +13,12 @@ from iapb.errors import ArgumentError, RunFileError
 from reports.figures.figure import Figure
 from reports.pages.records import Evidence
 from reports.store.keys import plain
-from verification.finding import Finding, Table, titled
+from verification.table import Table, titled
 
 NUMBERS_NAME = "numbers.json"
 FORMAT, FORMAT_VERSION = "iapb numbers", 2
 LARGEST_FILE = 200_000_000  # bytes; a report's is a few million
+_TEXTS = ("runs", "provenance")
 _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
@@ -48,9 +49,12 @@ def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: st
 
 
 def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
-    yield from _outcomes("verdicts", ((one.title, one.verdict, one.answer, one.timed) for one in evidence.topics))
-    yield from _outcomes("claims", ((one.key, one.verdict, one.answer, one.timed) for one in evidence.claims))
-    yield from _claim_parts(evidence.claims)
+    said = ("what", "outcome", "sentence")
+    yield from _by_time("verdicts", said, ((one.timed, one.title, one.verdict, one.answer) for one in evidence.topics))
+    yield from _by_time("claims", said, ((one.timed, one.key, one.verdict, one.answer) for one in evidence.claims))
+    yield from _by_time("claims/parts", ("part", "outcome", "holds in", "of", "cannot tell"), (
+        (part.timed, f"{claim.key}: {part.name}", part.outcome, part.held, part.decided, part.unknown)
+        for claim in evidence.claims for part in claim.parts))  # fmt: skip
     for claim in evidence.claims:
         for name, table in claim.tables.items():
             yield f"claims/{claim.key}" + (f", {name}" if name != claim.key else ""), table
@@ -60,28 +64,18 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
     yield from ((f"effects/{scene}", table) for scene, table in evidence.effects.items())
     for topic in evidence.topics:
         found = enumerate(topic.parts, 1)
-        yield from _outcomes(topic.key, ((number, one.verdict, one.sentence, one.timed) for number, one in found))
+        yield from _by_time(topic.key, said, ((one.timed, number, one.verdict, one.sentence) for number, one in found))
         yield from ((f"{topic.key}/{name}", table) for name, table in topic.tables.items())
 
 
-def _claim_parts(claims: Iterable[Finding]) -> Iterator[tuple[str, Table]]:
-    """Yield a table of the parts of all claims, and another one of the parts that depend on measured times."""
-    titles = ("part", "outcome", "holds in", "of", "cannot tell")
-    rows = {timed: [(f"{claim.key}: {part.name}", part.outcome, part.held, part.decided, part.unknown)
-                    for claim in claims for part in claim.parts if part.timed == timed]
-            for timed in (False, True)}  # fmt: skip
-    yield "claims/parts", titled(titles, rows[False])
+def _by_time(name: str, titles: tuple[str, ...], found: Iterable[tuple[Any, ...]]) -> Iterator[tuple[str, Table]]:
+    """Yield a table of the rows that do not depend on measured times, and another of those that do, by a first cell."""
+    rows: dict[bool, list[Any]] = {False: [], True: []}
+    for timed, *row in found:
+        rows[timed].append(tuple(row))
+    yield name, titled(titles, rows[False], prose=tuple(title for title in titles if title == "sentence"))
     if rows[True]:
-        yield "claims/parts, from times", titled(titles, rows[True], timed=titles[1:], timed_rows=True)
-
-
-def _outcomes(name: str, found: Iterable[tuple[Any, str, str, bool]]) -> Iterator[tuple[str, Table]]:
-    """Yield the outcomes and their sentences as one table, and those that depend on measured times as another."""
-    columns, kept = ("what", "outcome", "sentence"), tuple(found)
-    yield name, titled(columns, tuple(tuple(row) for *row, timed in kept if not timed), prose=("sentence",))
-    if any(timed for *_, timed in kept):
-        yield f"{name}, from times", titled(columns, tuple(tuple(row) for *row, timed in kept if timed),
-                                             timed=("outcome", "sentence"), timed_rows=True)  # fmt: skip
+        yield f"{name}, from times", titled(titles, rows[True], timed=titles[1:], timed_rows=True)
 
 
 def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
@@ -121,18 +115,13 @@ def read_numbers(where: Path | str) -> ReportNumbers:
         raise RunFileError(f"{path}: larger than {LARGEST_FILE} bytes: expected the numbers of a report")
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        return _checked(content)
+        if (found := (content["format"], content["format_version"])) != (FORMAT, FORMAT_VERSION):
+            raise ValueError(f"format {found[0]!r} {found[1]!r}: expected {FORMAT} {FORMAT_VERSION}")
+        tables = {str(name): _table(table) for name, table in content["tables"].items()}
+        runs, facts = ({str(key): str(value) for key, value in content[name].items()} for name in _TEXTS)
+        return ReportNumbers(tables, runs, facts, str(content["depth"]))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise RunFileError(f"{path}: cannot be read as the numbers of a report: {error}") from error
-
-
-def _checked(content: Any) -> ReportNumbers:
-    if (content["format"], content["format_version"]) != (FORMAT, FORMAT_VERSION):
-        found = f"{content['format']!r} {content['format_version']!r}"
-        raise ValueError(f"format {found}: expected {FORMAT} {FORMAT_VERSION}")
-    tables = {str(name): _table(table) for name, table in content["tables"].items()}
-    runs, facts = ({str(key): str(value) for key, value in content[part].items()} for part in ("runs", "provenance"))
-    return ReportNumbers(tables, runs, facts, str(content["depth"]))
 
 
 def _table(table: Any) -> Table:

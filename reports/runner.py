@@ -44,6 +44,7 @@ class Runner:
         self.user = ""  # the user recorded for the runs requested now
         self._held: dict[str, Fetched] = {}
         self._known: dict[str, UsedRun] = {}
+        self._places: dict[tuple[int, str, str], tuple[Place, Scene]] = {}
 
     def __call__(
         self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True, partial: bool = False
@@ -57,7 +58,7 @@ class Runner:
         if not partial:
             worlds.require_complete(run)
         self._know(entry, scene, world, rendering)
-        self.use_again(entry.file)
+        self.use_again(scene, world, rendering)
         return run
 
     def fetch(self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True) -> Fetched:
@@ -108,16 +109,21 @@ class Runner:
         """Return the sorted names of all run files used so far, inside and outside of an open `recording`."""
         return sorted({file for used in (*self._outside, self.used) for file in used})
 
-    def use_again(self, file: str) -> None:
-        """Record that the current user also uses a run that was requested before."""
-        add_use(self.used, replace(self._known[file], used_by=(self.user,) if self.user else ()))
+    def use_again(self, scene: Scene, world: str, rendering: str = "full") -> None:
+        """Record that the current user also uses a run, if it was requested before."""
+        if known := self._known.get(self.file_of(scene, world, rendering)):
+            add_use(self.used, replace(known, used_by=(self.user,) if self.user else ()))
 
     def file_of(self, scene: Scene, world: str, rendering: str = "full") -> str:
         """Return the name of the file of a run."""
         return self._place(scene, world, rendering).path.name
 
     def _place(self, scene: Scene, world: str, rendering: str) -> Place:
-        return self.store.place_of(self.inputs(scene, world, rendering), self.label(scene, world, rendering))
+        asked = id(scene), world, rendering
+        if asked not in self._places:  # a key costs a millisecond; the scene is held, so that its id stays its own
+            inputs, label = self.inputs(scene, world, rendering), self.label(scene, world, rendering)
+            self._places[asked] = self.store.place_of(inputs, label), scene
+        return self._places[asked][0]
 
     @contextmanager
     def crew(self, workers: int) -> Iterator[Callable[[Sequence[Wanted]], Iterator[Run | None]]]:

@@ -81,28 +81,23 @@ class _Stream:
         self._next = time.monotonic() + PAUSE
 
     def run(self, resume: bool, progress: Any) -> Streamed:
-        key, code, entry = self.place.key, code_label(), None
         try:
             resumed_at = self._go_on() if resume else 0
             stopped = record(self.recorder, self.total, progress, self._between)
+            target, code = (self.place.partial, "") if stopped else (self.place.path, code_label())
             if self.log is None:
-                run = self.recorder.run(self.world, stopped)
-                if stopped:
-                    store_run(self.place.partial, run, key=key, replace=True)
-                else:
-                    entry = store_run(self.place.path, run, key=key, code=code)
+                entry = store_run(target, self.recorder.run(self.world, stopped), key=self.place.key, code=code,
+                                  replace=bool(stopped))  # fmt: skip
             else:
                 self._spill()
                 parts = parts_of(self.log.path, self.joiner, self.world, self.log.steps)
-                if stopped:
-                    store_parts(self.place.partial, parts, stopped=stopped, key=key, replace=True)
-                else:
-                    entry = store_parts(self.place.path, parts, key=key, code=code)
-            if not stopped:
-                self.place.partial.unlink(missing_ok=True)
-                self._forget()
-            resumable = bool(stopped) and self.log is not None and self.simulation.keeps_no_state
-            return Streamed(entry, stopped, resumed_at, resumable)
+                entry = store_parts(target, parts, stopped=stopped, key=self.place.key, code=code,
+                                    replace=bool(stopped))  # fmt: skip
+            if stopped:
+                return Streamed(None, stopped, resumed_at, self.log is not None and self.simulation.keeps_no_state)
+            self.place.partial.unlink(missing_ok=True)
+            self._forget()
+            return Streamed(entry, "", resumed_at, False)
         finally:
             if self.log is not None:
                 self.log.close()
@@ -111,7 +106,7 @@ class _Stream:
         """Remove the log, also one that an earlier attempt left, unless another process is writing it."""
         path, log, self.log = log_of(self.place.path), self.log, None
         with suppress(LogLocked):
-            if log is not None or path.is_file():
+            if log is not None or is_log(path):
                 (log or RunLog(path, {}, anew=False)).close(remove=True)
 
     def _between(self) -> None:

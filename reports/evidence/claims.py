@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 
-from iapb.run import Run
-from iapb.scene import Scene
 from reports.runner import Runner
 from verification.claims import check_claims
 from verification.finding import Failure, Finding
@@ -28,31 +27,12 @@ def compute(
 
     workers : processes that simulate runs in advance; 1: all runs are simulated in this process
     """
-    files: dict[tuple[int, str, str], tuple[str, Scene]] = {}  # holds the scenes, so that their ids stay theirs
-
-    def run(scene: Scene, world: str, rendering: str) -> Run:
-        made = runner(scene, world, rendering, keep=False)
-        files[id(scene), world, rendering] = runner.file_of(scene, world, rendering), scene
-        return made
-
-    def asked(scene: Scene, world: str, rendering: str) -> None:
-        if (id(scene), world, rendering) in files:
-            runner.use_again(files[id(scene), world, rendering][0])
-
     def begin(done: int, total: int, claim: str) -> None:
         runner.user = claim
         progress(done, total)
 
-    with runner.crew(workers) if workers > 1 else nullcontext() as crew:
-
-        def ahead(wanted: Sequence[tuple[Scene, str, str]]) -> Iterator[Run | None]:
-            made_by_crew = crew(wanted) if crew else ()
-            for (scene, world, rendering), made in zip(wanted, made_by_crew, strict=True):
-                if made is not None:
-                    files[id(scene), world, rendering] = runner.file_of(scene, world, rendering), scene
-                yield made
-
-        results = check_claims(run, depth, progress=begin, asked=asked, ahead=ahead if crew else None)
+    with runner.crew(workers) if workers > 1 else nullcontext() as ahead:
+        results = check_claims(partial(runner, keep=False), depth, progress=begin, asked=runner.use_again, ahead=ahead)
     failures += [replace(one, case=f"{result.key}, {one.case}") if one.case != result.key else one
                  for result in results for one in result.failures]  # fmt: skip
     return results

@@ -81,6 +81,9 @@ class RunLog:
         self.end = 0
         self._seal = ""
         if anew:
+            if not _BEGINNING.startswith(os.pread(self._file, len(_BEGINNING), 0)):
+                os.close(self._file)
+                raise RunFileError(f"{path}: in the place of a log, but not a log of iapb: move it away")
             os.ftruncate(self._file, 0)
             self._write({"format": _FORMAT, "format_version": _VERSION, **head}, b"")
 

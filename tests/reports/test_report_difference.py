@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from iapb.errors import ArgumentError, RunFileError
+from iapb.errors import RunFileError
 from reports import cli
 from reports.difference import (
     CLOSE,
@@ -199,12 +199,6 @@ def test_a_foreign_file_is_refused_in_one_sentence(text, tmp_path, capsys):
         read_numbers(path)
     assert cli.main(["report", "diff", str(path), str(path)]) == 1
     assert capsys.readouterr().err.startswith("iapb: ")
-
-
-def test_a_page_alone_is_not_enough(tmp_path):
-    (tmp_path / "report.html").write_text("<p>")
-    with pytest.raises(ArgumentError, match=NUMBERS_NAME):
-        read_numbers(tmp_path / "report.html")
 
 
 def test_numbers_keep_their_last_bit_and_the_file_is_strict_json(tmp_path):

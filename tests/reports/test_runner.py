@@ -103,7 +103,7 @@ def test_runs_are_listed_under_everything_that_used_them(tmp_path):
     with runner.recording("trajectories") as inside:
         runner(PEG, "IAPB")
         runner.user = "forces"
-        runner.use_again(runner.file_of(PEG, "IAPB"))
+        runner.use_again(PEG, "IAPB")
         runner(PEG, "PB", keep=False)
     assert [run.used_by for run in inside.values()] == [("trajectories", "forces"), ("forces",)]
     with runner.recording("energy"):

@@ -139,8 +139,13 @@ def test_a_log_of_another_run_or_of_nobody_is_refused(tmp_path: Path) -> None:
     streaming.log_of(place.path).write_bytes(log.read_bytes())
     with pytest.raises(RunFileError, match="another run"):
         Runner(tmp_path).stream(other, "IAPB", resume=True)
+    foreign = tmp_path / "foreign.h5.log"
+    foreign.write_bytes(Path(__file__).read_bytes())
     with pytest.raises(RunFileError, match="no log"):
-        read_log(Path(__file__))
+        read_log(foreign)
+    with pytest.raises(RunFileError, match="not a log"):
+        RunLog(foreign, {})
+    assert foreign.read_bytes() == Path(__file__).read_bytes()
 
 
 def test_two_processes_do_not_write_one_log(tmp_path: Path) -> None:

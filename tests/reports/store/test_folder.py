@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import collections
 import os
-import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -112,43 +109,6 @@ def _counted(calls: collections.Counter[str], name: str, function: Any) -> Any:
         return function(*arguments, **options)
 
     return call
-
-
-KILLED_WRITER = """
-import sys
-sys.path.insert(0, sys.argv[2])
-import pickle
-from reports.store import write_run
-runs = pickle.load(open(sys.argv[3], "rb"))
-number = 0
-while True:
-    write_run(sys.argv[1], runs[number % len(runs)], replace=True)
-    if number == 0:
-        print("ready", flush=True)
-    number += 1
-"""
-
-
-@pytest.mark.parametrize("delay", [0.0, 0.011, 0.037])
-def test_a_killed_writer_leaves_the_last_whole_file(tmp_path: Path, make_run: MakeRun, delay: float) -> None:
-    import pickle
-    import time
-
-    runs = [make_run(steps=steps, seed=steps, complete=False) for steps in (50, 100, 150)]
-    (tmp_path / "runs.pickle").write_bytes(pickle.dumps(runs))
-    target = tmp_path / "run.h5.partial"
-    root = Path(__file__).parents[3]
-    process = subprocess.Popen(
-        [sys.executable, "-c", KILLED_WRITER, str(target), str(root), str(tmp_path / "runs.pickle")],
-        stdout=subprocess.PIPE,
-    )
-    assert process.stdout is not None and process.stdout.readline() == b"ready\n"
-    time.sleep(delay)
-    process.send_signal(signal.SIGKILL)
-    assert process.wait(30) == -signal.SIGKILL
-    process.stdout.close()
-    found = read_run(target)
-    assert not found.complete and content_hash(found) in {content_hash(run) for run in runs}
 
 
 def test_what_a_killed_writer_left_aside_is_removed_once_it_is_old(tmp_path: Path) -> None:

@@ -64,12 +64,6 @@ def test_several_tables_share_a_file(tmp_path: Path) -> None:
         read_table(path, "third")
 
 
-def test_a_new_table_takes_the_place_of_the_old(tmp_path: Path) -> None:
-    write_table(tmp_path / "t.h5", TABLE)
-    write_table(tmp_path / "t.h5", Table("fig03", TABLE.columns[:2]))
-    assert len(read_table(tmp_path / "t.h5").columns) == 2
-
-
 def test_damage_is_found(tmp_path: Path) -> None:
     path = write_table(tmp_path / "t.h5", TABLE)
     with h5py.File(path, "r+") as file:
