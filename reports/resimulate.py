@@ -90,7 +90,7 @@ def law_of(run: Run) -> Any:
         module, name = LAWS[run.law]
         kind = getattr(import_module(module), name)
         return kind(**_known(kind, run.law_settings))
-    law = find_world(run.world).law if run.world in WORLDS else None
+    law: Any = find_world(run.world).law if run.world in WORLDS else None
     law = law.within(scene_of(run)) if hasattr(law, "within") else law
     if law is None or (law.name, dict(law.settings)) != (run.law, dict(run.law_settings)):
         raise ArgumentError("law", run.law,

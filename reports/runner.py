@@ -143,11 +143,12 @@ class Runner:
             yield made
 
     def _know(self, entry: RunEntry, scene: Scene, world: str, rendering: str) -> None:
-        if entry.file not in self._known:
+        name = self.file_of(scene, world, rendering)
+        if name not in self._known or self._known[name].file != entry.file:  # a partial run has another file
             command = run_command(scene, world, rendering) or f"iapb store again out/runs/{entry.file}"
             size = (self.store.folder / entry.file).stat().st_size
-            self._known[entry.file] = UsedRun(self.label(scene, world, rendering), entry.file, entry.run_key,
-                                              entry.content_hash, command, size, entry.status)  # fmt: skip
+            self._known[name] = UsedRun(self.label(scene, world, rendering), entry.file, entry.run_key,
+                                        entry.content_hash, command, size, entry.status)  # fmt: skip
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:

@@ -67,10 +67,12 @@ class Stage:
         if self.path.is_file():
             content = read_record(self.path)
             self.runs = {run["file"]: UsedRun(**run | {"used_by": tuple(run["used_by"])}) for run in content["runs"]}
-            for run in self.runs.values() if runner is not None else ():
-                add_use(runner.used, run)
+            if runner is not None:
+                for run in self.runs.values():
+                    add_use(runner.used, run)
             return adapter.validate_python(content["records"])
-        with runner.recording(self.name.replace("_", " ")) if runner is not None else nullcontext({}) as used:
+        recording = runner.recording(self.name.replace("_", " ")) if runner is not None else nullcontext(self.runs)
+        with recording as used:
             records = compute()
         self.runs = dict(used)
         content = {"runs": list(self.runs.values()), "records": plain(records)}

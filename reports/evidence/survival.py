@@ -9,17 +9,7 @@ from typing import Any
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.resimulate import repeat_run
 from reports.runner import Runner
-from verification.finding import (
-    REFUTED,
-    REPRODUCED,
-    Failure,
-    Finding,
-    Part,
-    Table,
-    finding_of,
-    of_each,
-    titled,
-)
+from verification.finding import REFUTED, REPRODUCED, Failure, Finding, Part, finding_of, of_each, titled
 
 LEAD = "Do runs come out the same to the last bit when they are simulated again from their files alone?"
 
@@ -28,8 +18,13 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     """Simulate the runs of the figures again from their files."""
     failures: list[Failure] = []
     repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
-    part = _repetitions(repeated)
-    tables = {"simulated again": _repeated_table(repeated)}
+    same = sum(repetition.same for _, repetition in repeated)
+    part = Part(f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated again from "
+                "their own files alone.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
+    table = titled(("run", "content hash stored", "simulated again", "differs in"), [
+        (name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
+        for name, one in repeated])  # fmt: skip
+    tables = {"simulated again": table}
     return finding_of("survival", "Runs that survive", LEAD, part.sentence, (part,), tables, failures)
 
 
@@ -39,15 +34,3 @@ def _repeated(runner: Runner, name: str) -> Any:
     runner(source, world, rendering)
     path = runner.store.folder / runner.file_of(source, world, rendering)
     yield name, repeat_run(path)
-
-
-def _repetitions(repeated: Any) -> Part:
-    same = sum(repetition.same for _, repetition in repeated)
-    return Part(f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated again from "
-                   "their own files alone.", REPRODUCED if same == len(repeated) else REFUTED)  # fmt: skip
-
-
-def _repeated_table(repeated: Any) -> Table:
-    rows = tuple((name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
-                 for name, one in repeated)  # fmt: skip
-    return titled(("run", "content hash stored", "simulated again", "differs in"), rows)

@@ -67,7 +67,8 @@ class RunStore:
         The file name starts with `label`. The label is not part of the key: a run is found under any label.
         """
         key = run_key(inputs, self.code)
-        path = self.folder / file_name(label, key)
+        word = re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run"
+        path = self.folder / f"{word}-{key[:_KEY_DIGITS]}.h5"
         return Place(key, path if path.is_file() else min(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"), default=path))
 
     def get_or_run(self, inputs: Mapping[str, Any], compute: Callable[[], Run], label: str = "run") -> Run:
@@ -127,8 +128,3 @@ class RunStore:
     def entries(self) -> tuple[RunEntry, ...]:
         """Return one entry per finished run in the folder, by file name; other and damaged files are left out."""
         return tuple(of_each(sorted(self.folder.glob("*.h5")), lambda path: [read_entry(path)], []))
-
-
-def file_name(label: str, key: str) -> str:
-    """Return the name of a run's file: a label for readers, and the start of the run key."""
-    return (re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run") + f"-{key[:_KEY_DIGITS]}.h5"

@@ -91,7 +91,9 @@ def sources_hash(folder: str) -> str:
         raise ArgumentError("folder", folder, "a folder of the checkout with Python files")
     names = {name: hashlib.sha256(source).hexdigest() for name, source in files.items()}
     kept = Path(cache_from_source(__file__)).with_name(f"code-{folder.replace('/', '-')}-{sys.version_info.minor}.json")
-    known = _remembered(kept)
+    known: dict[str, str] = {}
+    with suppress(OSError, ValueError, TypeError):
+        known = dict(json.loads(kept.read_text(encoding="utf-8")))
     codes = {names[name]: known.get(names[name]) or code_hash(source) for name, source in files.items()}
     if codes != known:
         with suppress(OSError):  # the folder may be read-only
@@ -99,12 +101,6 @@ def sources_hash(folder: str) -> str:
             with written_aside(kept, replace=True) as aside:
                 aside.write_text(json.dumps(codes), encoding="utf-8")
     return hash_of({name: codes[digest] for name, digest in names.items()})
-
-
-def _remembered(kept: Path) -> dict[str, str]:
-    with suppress(OSError, ValueError, TypeError):
-        return dict(json.loads(kept.read_text(encoding="utf-8")))
-    return {}
 
 
 def code_hash(source: bytes) -> str:

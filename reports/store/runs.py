@@ -263,14 +263,16 @@ def _run_in(file: Any, path: Path | str, read: Reader) -> Run:
     energy, effects, names = _group(file, "energy", path), file["effects"], file["mechanism"]
     lists = [read_values(effects, name, place) for name in ("effect", "active", "reason")]
     lists.append(read_values(effects, "ignores", place) if "ignores" in effects else ("",) * len(lists[0]))  # old files
+    parts: dict[str, Any] = texts | {attribute: json.loads(texts[attribute]) for attribute in JSON_TEXTS}
+    parts |= {name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES}
+    for name in ("tool_dofs", "tool_coordinates"):
+        start, stop = file.attrs[name]
+        parts[name] = index(start), index(stop)
+    for name in ("coordinate", "velocity"):
+        parts[f"{name}_names"] = read_values(names, name, place)
+        parts[f"{name}_units"] = read_values(names, f"{name}_unit", place)
     return Run(
-        **texts | {attribute: json.loads(texts[attribute]) for attribute in JSON_TEXTS},
-        **{name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES},
-        **{name: tuple(map(index, file.attrs[name])) for name in ("tool_dofs", "tool_coordinates")},
-        **{f"{dimension}_names": read_values(names, dimension, place) for dimension in ("coordinate", "velocity",
-                                                                                        "body")},
-        **{f"{dimension}_units": read_values(names, f"{dimension}_unit", place)
-           for dimension in ("coordinate", "velocity")},
+        **parts, body_names=read_values(names, "body", place),
         **tables["trajectory"], **tables["steps"], **tables["timings"],
         dt=float(file.attrs["dt"]), complete=file.attrs["status"] == "complete",
         stopped=str(file.attrs.get("stopped", "")), time=_numbers(read, file["trajectory"], TIME, place),

@@ -95,15 +95,8 @@ def run_sweep(
                scheduler=scheduler, progress=progress or (lambda done, total: None))  # fmt: skip
     ordered = tuple(results[point.index] for point in points)
     _write_summary(folder / SUMMARY, study, points, ordered)
-    return SweepOutcome(folder, ordered, _hash(ordered))
-
-
-def _hash(results: tuple[Result, ...]) -> str:
-    """Return one hash of all results, in the order of the points."""
-    digest = hashlib.sha256()
-    for result in results:
-        digest.update(f"{result.index} {result.status} {result.content_hash}\n".encode())
-    return digest.hexdigest()
+    hashed = "".join(f"{result.index} {result.status} {result.content_hash}\n" for result in ordered)
+    return SweepOutcome(folder, ordered, hashlib.sha256(hashed.encode()).hexdigest())
 
 
 def _write_summary(path: Path, study: Study, points: list[Point], results: tuple[Result, ...]) -> None:
