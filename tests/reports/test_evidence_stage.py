@@ -167,17 +167,10 @@ def test_a_damaged_file_is_an_error_not_a_result(tmp_path):
 
 ANY = (None, math.nan, math.inf, -math.inf, -0.0, 0.1, 5e-324, 3, -(2**53) - 1, 2**70, True, False,
        "", "é", "nan", "True", "None")  # fmt: skip
-CELLS = {
-    "floats": (1.5, math.nan, -math.inf), "with none": (1.5, None, math.nan), "whole": (1, 2**53, -3),
-    "whole with none": (None, 2, 3), "large": (2**53 + 1, 1.5, 2), "truths": (True, False, True),
-    "truths with none": (True, None, False), "texts": ("a", "", "ä/b"), "texts with none": ("a", None, ""),
-    "nothing": (None, None, None), "mixed": (1, 2.0, True), "all": (1.5, "1.5", 7),
-}  # fmt: skip
 
 
-@pytest.mark.parametrize("cells", [*CELLS.values(), ANY], ids=[*CELLS, "any"])
-def test_every_cell_comes_back_with_its_type(tmp_path, cells):
-    table = Table((Column("a/b", "m"), Column("row")), tuple((cell, 0) for cell in cells))
+def test_every_cell_comes_back_with_its_type(tmp_path):
+    table = Table((Column("a/b", "m"), Column("row")), tuple((cell, 0) for cell in ANY))
     [_, read] = [Stage(tmp_path, "one", Table, {}).get_or_compute(lambda: table) for _ in range(2)]
     assert same(read, table)
 

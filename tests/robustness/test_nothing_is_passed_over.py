@@ -17,7 +17,7 @@ from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.scene import load_scene, scene_folder
 from iapb.scene.document import Document
 from reference.datasets import DatasetError, read_problem
-from reports.sweeps.study import find_study, scene_of, study_from_text
+from reports.sweeps.study import scene_of, study_from_text
 
 SCENES = sorted(scene_folder().glob("*.yaml"))
 ROBOT = scene_folder() / "robots" / "seven_axis_arm.urdf"  # it has collision elements
@@ -106,12 +106,6 @@ def test_no_study_leads_out_of_its_folder(scene: str, tmp_path: Path) -> None:
     study = study_from_text(f"name: s\nscene: {scene}\n")
     with pytest.raises(ArgumentError, match="scene"):
         scene_of(study, folder / "study.yaml")
-
-
-def test_the_scenes_of_our_studies_are_found() -> None:
-    for name in ("corner_tilt", "struck_discs"):
-        path = find_study(name)
-        assert scene_of(study_from_text(path.read_text()), path).is_file()
 
 
 def test_a_few_packed_bytes_cannot_ask_for_any_memory(tmp_path: Path) -> None:
