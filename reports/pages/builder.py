@@ -22,10 +22,9 @@ from reports.figures.standalone import swatch
 from reports.pages.first import answer, facts
 from reports.pages.formulas import formula, prose
 from reports.pages.matrix import matrices, worst_first
-from reports.pages.records import Evidence
+from reports.pages.records import Evidence, anchor, runs_by_user
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import explained
-from reports.pages.uses import anchor, runs_by_user
 from verification.claims.peg import FULL
 from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
 from verification.scenes.measures import COORDINATES

@@ -9,8 +9,7 @@ import pytest
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from reports import cli
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
-from reports.pages.records import StoredFile
-from reports.pages.uses import runs_by_user
+from reports.pages.records import StoredFile, runs_by_user
 from reports.runner import Runner
 from reports.uses import changes, run_command
 
