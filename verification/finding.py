@@ -15,18 +15,8 @@ from typing import Any, TypeVar
 
 from iapb.errors import ArgumentError
 from iapb.names import one_of
-from verification.region import LEAST_CONFIRMING as LEAST_CONFIRMING
-from verification.region import Region as Region
-from verification.region import confirmed
-from verification.region import search_region as search_region
-from verification.table import HOLDS as HOLDS
-from verification.table import WORDS as WORDS
-from verification.table import Column as Column
-from verification.table import Row as Row
-from verification.table import Table as Table
-from verification.table import ranges as ranges
-from verification.table import table_of as table_of
-from verification.table import titled as titled
+from verification.region import Region, confirmed
+from verification.table import Table, ranges, titled
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")

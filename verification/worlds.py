@@ -38,16 +38,7 @@ from reference.worlds import WORLDS, run_world
 from verification.complementarity.agreement import compare_cases
 from verification.complementarity.of_runs import impacts_of_run, problems_of_run
 from verification.complementarity.solvers import VERDICTS, ProblemStudy, study_read
-from verification.finding import (
-    MIXED,
-    NOT_TESTABLE,
-    REPRODUCED,
-    Failure,
-    Finding,
-    Part,
-    attempt,
-    finding_of,
-)
+from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Finding, Part, attempt, finding_of
 from verification.table import Table, titled
 
 Floats = NDArray[np.float64]

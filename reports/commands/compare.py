@@ -24,7 +24,8 @@ from reports.store.keys import plain
 from verification.check import Topic
 from verification.complementarity.solvers import collections, own_problems
 from verification.complementarity.topic import complementarity
-from verification.finding import Finding, Table, titled
+from verification.finding import Finding
+from verification.table import Table, titled
 from verification.worlds import compare_worlds
 
 FOLDER = Path("out/compare")

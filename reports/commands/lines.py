@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from verification.finding import Table
+from verification.table import Table
 
 WIDTH = 80
 _WIDEST = 26  # of a column; longer texts go on in the next line

@@ -23,12 +23,13 @@ from reports.uses import UsedRun
 from verification import haptic_rate
 from verification.cost import effects
 from verification.cost.impacts import work_precision
-from verification.finding import Failure, Finding, Table, attempt
+from verification.finding import Failure, Finding, attempt
 from verification.hard_cases import study as hard_cases
 from verification.laws import topic as laws
 from verification.proofs import check_all, on_proofs
 from verification.proofs.coq_development import Theorem, theorems
 from verification.proofs.show import ProofRecord
+from verification.table import Table
 
 Progress = Callable[[str, int, int], None]
 Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise

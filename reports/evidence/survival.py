@@ -9,7 +9,8 @@ from typing import Any
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.resimulate import repeat_run
 from reports.runner import Runner
-from verification.finding import REFUTED, REPRODUCED, Failure, Finding, Part, finding_of, of_each, titled
+from verification.finding import REFUTED, REPRODUCED, Failure, Finding, Part, finding_of, of_each
+from verification.table import titled
 
 LEAD = "Do runs come out the same to the last bit when they are simulated again from their files alone?"
 

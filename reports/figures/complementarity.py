@@ -21,7 +21,7 @@ from reports.figures.style import (
     looks_of,
 )
 from verification.cost.calls import PRINTED
-from verification.finding import Table, titled
+from verification.table import Table, titled
 
 Rows = list[dict[str, Any]]
 

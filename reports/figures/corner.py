@@ -20,7 +20,7 @@ from reports.figures.geometry import body_outlines
 from reports.figures.labels import arrow_of_time, note_beside
 from reports.figures.plot import PATH, TIME, Plot
 from reports.figures.style import FORCE, MUTED, PANEL, STYLES, LineStyle, line_arguments
-from verification.finding import Table, titled
+from verification.table import Table, titled
 
 Floats = NDArray[np.float64]
 

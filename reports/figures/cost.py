@@ -32,7 +32,7 @@ from verification.cost import trajectories as motion
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
 from verification.cost.steps import IDEAL
-from verification.finding import Table
+from verification.table import Table
 
 Row = Mapping[str, Any]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
 from reports.figures.style import BOUND, line_arguments, looks_of
-from verification.finding import Table
+from verification.table import Table
 
 _SMALLEST = 1e-18  # no gain at all is drawn here: a tenth of what double precision can show
 # columns of the input, which has a row per method and decade of κ(M)

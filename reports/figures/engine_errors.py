@@ -9,7 +9,7 @@ from typing import Any
 from reports.figures.figure import Cell, Drawn, Panel, grid, recipe
 from reports.figures.numbers import MINUS
 from reports.figures.style import AMBER, BLUE, RULE, SKY, VERMILION, LineStyle
-from verification.finding import Table
+from verification.table import Table
 
 LEVELS = {"to 10⁻⁶": (1e-6, BLUE, 0.75), "to 10⁻²": (1e-2, SKY, 0.55), "to 10⁻¹": (1e-1, AMBER, 0.6),
           "above": (float("inf"), VERMILION, 0.75)}  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from reports.figures.canvas import Canvas
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.style import BLUE, FORCE, GREEN, INK, MUTED, PEG
-from verification.finding import titled
+from verification.table import titled
 
 _BOARD = np.zeros(2), np.array([8.2, 5.2])  # corners, in arbitrary units
 

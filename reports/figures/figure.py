@@ -13,7 +13,7 @@ from typing import Any
 from markupsafe import Markup
 
 from reports.figures.style import LineStyle, css
-from verification.finding import Table
+from verification.table import Table
 
 Legend = tuple[tuple[str, LineStyle], ...]
 

@@ -20,7 +20,7 @@ from reports.figures.corner import UNLIMITED
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
 from reports.figures.geometry import Floats, body_outlines, half_plane, outline
 from reports.figures.style import BLUE, FORCE, INK, PEG, WALL, css
-from verification.finding import titled
+from verification.table import titled
 
 SIZE = (400, 300)
 _MOMENTS, _IMPACTS, _MARKED = 160, 30, 60  # moments of a film, first impacts that it adds, moments with marks

@@ -14,7 +14,7 @@ from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
 from reports.figures.style import FORCE, INK, MUTED, PAPER, STYLES, LineStyle, line_arguments, styled
 from reports.figures.svg import to_svg
-from verification.finding import Table
+from verification.table import Table
 
 # start of a treatment's name -> its look
 TREATMENTS = {

@@ -6,7 +6,7 @@ from reports.figures.canvas import note
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
 from reports.figures.style import BOUND, MUTED, STYLES, LineStyle, line_arguments, looks_of
-from verification.finding import Table
+from verification.table import Table
 
 _LOOKS = looks_of(("absolute angles", "place of the hand"))
 _STRAIGHT = 1e-13  # [rad] where the straight arm itself is drawn, on an axis that has no zero

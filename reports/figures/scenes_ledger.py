@@ -24,7 +24,7 @@ from reports.figures.style import (
     styled,
 )
 from reports.figures.svg import to_svg
-from verification.finding import Table
+from verification.table import Table
 
 # heading of the table -> (text of the legend, colour), from the bottom of the stack
 LAYERS = (

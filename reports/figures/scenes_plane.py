@@ -13,7 +13,7 @@ from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.geometry import body_outlines, body_placements, bounds
 from reports.figures.numbers import MINUS
 from reports.figures.style import BLUE, INK, MUTED, PANEL
-from verification.finding import titled
+from verification.table import titled
 
 _LONGEST = 0.22  # arrow length, as a share of the picture
 

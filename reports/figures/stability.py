@@ -10,7 +10,7 @@ import numpy as np
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
 from reports.figures.style import BOUND, MUTED, STYLES, LineStyle
-from verification.finding import Table
+from verification.table import Table
 
 _HOLDS = {  # which laws hold a wall -> its mark, in the colour of the world
     "both laws": LineStyle(MUTED, "o", (), 0.0),

@@ -18,7 +18,7 @@ from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.geometry import body_placements
 from reports.figures.plot import Plot
 from reports.figures.style import BLUE, BOUND, INK, LINK, MUTED, PAPER, PEG, STYLES, VERMILION, line_arguments
-from verification.finding import titled
+from verification.table import titled
 
 LENGTH = 1.0  # of both links [m]
 CONTACTS = {"A": 0.7, "B": 0.5}  # distance along the second link [m]

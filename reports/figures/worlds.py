@@ -8,7 +8,7 @@ from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.numbers import power_of_ten
 from reports.figures.style import LineStyle, line_arguments, looks_of, styled
 from reports.figures.svg import to_svg
-from verification.finding import Table
+from verification.table import Table
 
 _SIZE = (9.6, 5.4)  # inches
 _DISTANCES = ("configuration", "velocity", "impulse")  # zero in the reference world

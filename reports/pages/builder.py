@@ -26,8 +26,9 @@ from reports.pages.records import Evidence, anchor, runs_by_user
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import explained
 from verification.claims.peg import FULL
-from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part, Table
+from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part
 from verification.scenes.measures import COORDINATES
+from verification.table import Table
 
 FIRST_PAGE = "report.html"
 # Largest number of table rows, or runs of a claim, on a page, to keep it small; the files beside it have all of them.

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.figures.numbers import power_of_ten
-from verification.finding import Finding, Table
+from verification.finding import Finding
 from verification.hard_cases.study import ENGINE, STABLE
+from verification.table import Table
 
 # verdict -> its mark and the class of its colour: shape as well as colour
 MARKS = {

@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from verification.finding import Failure, Finding, Table
+from verification.finding import Failure, Finding
 from verification.proofs.show import ProofRecord
+from verification.table import Table
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
 from verification.cost.impacts import WAYS
 from verification.cost.trajectories import BELOW, INTEGRATORS, OK, TIMED_OUT, WORLDS
-from verification.finding import Table, titled
+from verification.table import Table, titled
 
 _SCENES = tuple(f"scene {k}" for k in range(6))
 STEPS, UNTOUCHED = 128, 40

@@ -14,9 +14,10 @@ import pytest
 from reports import cli
 from reports.commands.answer import print_json
 from verification.cost.impacts import Choice
-from verification.finding import REPRODUCED, Column, Finding, Part, Table
+from verification.finding import REPRODUCED, Finding, Part
 from verification.proofs import all_proofs
 from verification.proofs.coq_development import Theorem
+from verification.table import Column, Table
 
 ROOT = Path(__file__).parents[2]
 SHORT = ("--set", "duration=0.4")

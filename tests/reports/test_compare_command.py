@@ -9,7 +9,7 @@ import pytest
 
 from reports import cli
 from reports.commands.lines import WIDTH, sentence, table_lines
-from verification.finding import titled
+from verification.table import titled
 
 SLOPE = Path(__file__).parents[1] / "verification" / "worlds" / "slope.yaml"
 SHORT = ("--set", "duration=0.05", "--worlds", "IAPB,ideal,ideal-friction")

@@ -25,7 +25,7 @@ from verification.cost import solvers as timings
 from verification.cost.solvers import FAMILIES as TIMED
 from verification.cost.solvers import IMPACT_TIMES, LEMKE_KERNEL, Size
 from verification.cost.steps import STEP_TIMES, WAYS
-from verification.finding import Table
+from verification.table import Table
 
 KEY = topic.TOPIC.key
 

@@ -25,7 +25,8 @@ from reports.pages.records import Evidence
 from reports.report import DIRTY_NAME, remembering, write_companions, write_report
 from reports.runner import Runner
 from reports.store.io import MARK_NAME
-from verification.finding import REPRODUCED, Finding, Part, finding_of, titled
+from verification.finding import REPRODUCED, Finding, Part, finding_of
+from verification.table import titled
 
 PANEL = Panel("<svg viewBox='0 0 1 1'></svg>", "nothing")
 FIGURE = Figure("figA", "", "A", "See.", (PANEL,), titled(("x",), ((0.1,),)))

@@ -20,7 +20,8 @@ from reports.evidence.stage import Stage
 from reports.provenance import UNKNOWN, dispatched, linear_algebra, this_machine
 from reports.runner import Runner
 from reports.store import keys
-from verification.finding import VERDICTS, Column, Failure, Finding, Part, Table, finding_of, titled
+from verification.finding import VERDICTS, Failure, Finding, Part, finding_of
+from verification.table import Column, Table, titled
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,14 @@ from reports.runner import Runner
 from verification import proofs
 from verification.claims import arm
 from verification.cost import effects, impacts
-from verification.finding import NOT_COMPUTED, Column, Failure, Table, failure_of
+from verification.finding import NOT_COMPUTED, Failure, failure_of
 from verification.hard_cases import judge
 from verification.hard_cases import study as hard_cases
 from verification.laws import engine as engine_laws
 from verification.laws import equality, trajectories
 from verification.laws import topic as laws
 from verification.laws.contracts import CONTRACTS
+from verification.table import Column, Table
 
 Patch = pytest.MonkeyPatch
 Found = tuple[Any, list[Failure]]

@@ -32,7 +32,7 @@ from reports.figures.svg import to_svg
 from reports.figures.two_link_arm import arm_energies
 from tests.reports.figure_inputs import all_inputs
 from tests.reports.test_figure_labels import crossed
-from verification.finding import titled
+from verification.table import titled
 
 GAINS = titled(
     (energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN, energy_gains.SHARE),

@@ -7,18 +7,9 @@ from dataclasses import replace
 from reports.pages.first import LIMIT, MISSES_SHOWN, Answer, answer, facts
 from reports.pages.records import Evidence
 from verification.claims.peg import LARGE
-from verification.finding import (
-    MIXED,
-    NOT_COMPUTED,
-    REFUTED,
-    REPRODUCED,
-    WHERE,
-    Finding,
-    Part,
-    Region,
-    finding_of,
-    titled,
-)
+from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, WHERE, Finding, Part, finding_of
+from verification.region import Region
+from verification.table import titled
 
 ROWS = ((LARGE, "x", 10.0, 1.0), (LARGE, "y", 6.0, 2.0), (LARGE, "x", 8.0, 1.0), (LARGE, "theta", 1.0, 1.0),
         ("other", "x", 99.0, 1.0))  # fmt: skip

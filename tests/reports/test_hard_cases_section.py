@@ -12,9 +12,10 @@ from reports.pages.matrix import MARKS, decade, matrices, worst_first
 from reports.pages.records import Evidence
 from reports.runner import Runner
 from tests.reports.joined import joined
-from verification.finding import Column, Finding, Table, finding_of, table_of
+from verification.finding import Finding, finding_of
 from verification.hard_cases import study
 from verification.hard_cases.study import STABLE
+from verification.table import Column, Table, table_of
 
 CHOSEN = ("grazing", "nearly_parallel_normals", "chatter")
 

@@ -7,8 +7,10 @@ from reports.pages.builder import ROWS_SHOWN, badge_words
 from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
 from tests.reports.joined import joined
-from verification.finding import MIXED, REFUTED, REPRODUCED, WHERE, Part, Region, finding_of, titled
+from verification.finding import MIXED, REFUTED, REPRODUCED, WHERE, Part, finding_of
 from verification.hard_cases.study import finding_on
+from verification.region import Region
+from verification.table import titled
 
 DETAILS = dict.fromkeys(("source", "kind", "why it is hard", "truth", "expected"), "said")
 RUNS = tuple(

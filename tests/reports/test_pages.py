@@ -27,21 +27,10 @@ from tests.reports.joined import joined
 from verification.claims import CLAIMS
 from verification.claims.conditions import full_grid
 from verification.claims.peg import FULL
-from verification.finding import (
-    MIXED,
-    NOT_COMPUTED,
-    REFUTED,
-    REPRODUCED,
-    VERDICTS,
-    Column,
-    Finding,
-    Part,
-    finding_of,
-    table_of,
-    titled,
-)
+from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, VERDICTS, Finding, Part, finding_of
 from verification.hard_cases.study import finding_on, on_hard_cases
 from verification.laws.topic import counterexample, properties
+from verification.table import Column, table_of, titled
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 

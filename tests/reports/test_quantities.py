@@ -11,7 +11,8 @@ from reports.commands.reproduce import print_contradictions
 from reports.pages.builder import FIRST_PAGE, build_report
 from reports.pages.quantities import contradictions, unsaid
 from reports.pages.records import Evidence
-from verification.finding import MIXED, QUANTITIES, REPRODUCED, Column, Finding, Part, finding_of, table_of
+from verification.finding import MIXED, QUANTITIES, REPRODUCED, Finding, Part, finding_of
+from verification.table import Column, table_of
 
 BODIES = "exponent of bodies"
 

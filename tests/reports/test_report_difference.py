@@ -27,7 +27,7 @@ from reports.difference import (
     unlike,
 )
 from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
-from verification.finding import titled
+from verification.table import titled
 
 TABLE = titled(("method", "gain", "median [µs]", "stable", "note"),
                 (("factored", 1.5, 12.0, True, "rank 3 of 4"), ("svd", math.nan, 40.0, True, ""),

@@ -33,9 +33,9 @@ from verification.cost.trajectories import (
     tenfold_cost,
     worth,
 )
-from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding, Table
+from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding
 from verification.haptic_rate import BENCH, KERNELS, RATE, SOLVERS, TOPIC, quoting
-from verification.table import table_from
+from verification.table import Table, table_from
 
 Tables = dict[str, Table]
 

@@ -18,19 +18,18 @@ from verification.finding import (
     NOT_COMPUTED,
     REFUTED,
     REPRODUCED,
-    Column,
     Failure,
     Finding,
     Part,
     counted,
     finding_of,
     of_each,
-    table_of,
 )
 from verification.proofs import layout
 from verification.proofs.coq_development import ARGUED, NO_ANSWER, Theorem, says, statements
 from verification.proofs.prove import checked
 from verification.proofs.show import NO, NOT_APPLICABLE, YES, ProofRecord
+from verification.table import Column, table_of
 
 
 def all_proofs() -> tuple[str, ...]:

@@ -21,7 +21,8 @@ from reports.pages.builder import build_report
 from reports.pages.records import Evidence
 from reports.report import write_report
 from tests.reports.figure_inputs import made_motion
-from verification.finding import MIXED, REPRODUCED, Part, finding_of, titled
+from verification.finding import MIXED, REPRODUCED, Part, finding_of
+from verification.table import titled
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (

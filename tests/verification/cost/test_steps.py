@@ -12,7 +12,8 @@ from verification.cost import robots, steps
 from verification.cost.growth import power_law
 from verification.cost.resting import RestingScene, resting_scenes
 from verification.cost.steps import OwnLoop
-from verification.finding import NOT_COMPUTED, titled
+from verification.finding import NOT_COMPUTED
+from verification.table import titled
 
 SCENES = {scene.name: scene for scene in resting_scenes()}
 

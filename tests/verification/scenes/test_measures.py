@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from verification.claims.conditions import TIGHT, Condition, drawn, limited_conditions, start_conditions
-from verification.finding import Region
+from verification.region import Region
 from verification.scenes.measures import (
     Trace,
     bounces,
