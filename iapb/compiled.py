@@ -18,7 +18,7 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from itertools import accumulate
 from pathlib import Path
 from types import SimpleNamespace
@@ -113,9 +113,12 @@ class Entry:
 
     def taking(self, *examples: Any) -> Callable[..., Any]:
         """Return the machine code's own Python function for arguments of these types."""
-        made: Callable[..., Any] = (
-            self._function if config.DISABLE_JIT else self._function.compile(tuple(map(_kind, examples))))
-        return made
+        return self._function if config.DISABLE_JIT else _code(self._function, *map(_kind, examples))
+
+
+@cache  # numba takes 30 µs to find the code again
+def _code(function: Any, *kinds: types.Type) -> Any:
+    return function.compile(kinds)
 
 
 @kernel
@@ -140,6 +143,11 @@ class BlockType(types.Type):
         super().__init__(f"{name}({', '.join(f'{field}: {kind}' for field, kind in fields.items())})")
 
 
+@cache  # to write the name of a world's type takes 0.3 ms
+def _type_of(name: str, *fields: tuple[str, types.Type]) -> BlockType:
+    return BlockType(name, dict(fields))
+
+
 class Block:
     """A NamedTuple or dict of arrays, numbers and further such content, laid out in memory for kernels.
 
@@ -151,7 +159,7 @@ class Block:
         self._members = {name: block(value) if isinstance(value, dict) or hasattr(value, "_fields") else value
                          for name, value in given.items()}
         self._content = SimpleNamespace(**self._members) if given is content else content._replace(**self._members)
-        self.block_type = BlockType(type(content).__name__, {k: _kind(value) for k, value in self._members.items()})
+        self.block_type = _type_of(type(content).__name__, *((k, _kind(value)) for k, value in self._members.items()))
         self._memory = np.array([word for value in self._members.values() for word in _layout(value)], np.int64)
         self.address = self._memory.ctypes.data
 
