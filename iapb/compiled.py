@@ -143,7 +143,7 @@ class BlockType(types.Type):
         super().__init__(f"{name}({', '.join(f'{field}: {kind}' for field, kind in fields.items())})")
 
 
-@cache  # to write the name of a world's type takes 0.3 ms
+@cache  # to write the names of the types of a state takes 0.1 ms
 def _type_of(name: str, *fields: tuple[str, types.Type]) -> BlockType:
     return BlockType(name, dict(fields))
 

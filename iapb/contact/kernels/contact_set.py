@@ -128,8 +128,9 @@ def moving_tree(world, body):
 @kernel
 def join(world, contacts, i, group_of_tree):
     """Merge the groups of the trees of contact i if both can move; the root of a group is its smallest tree."""
-    a, b = moving_tree(world, contacts.body_a[i]), moving_tree(world, contacts.body_b[i])
-    if a < 0 or b < 0:
+    b = moving_tree(world, contacts.body_b[i])  # often the static world
+    a = moving_tree(world, contacts.body_a[i]) if b >= 0 else -1
+    if a < 0:
         return
     while group_of_tree[a] != a:
         a = group_of_tree[a]
