@@ -213,6 +213,7 @@ def _edges(shapes, a, b, i, j, gap, A, B, buffer, count):
 # Face against face of two boxes: the corners of their overlap as contacts. In the frame of the reference face (x, y
 # along its sides, h the height over it) the incident face is c + α e1 + β e2 with α, β in [-1, 1].
 MOST_POINTS = BOX_PAIR_CONTACTS  # the corners of a large quadrilateral carry any load between them
+ALIGNED = 1e-9  # of the faces' sizes: points closer than this are one corner; far above rounding, far below any sag
 
 
 @kernel
@@ -235,8 +236,9 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, m
     e1, e2 = (dot(first, u), dot(first, v), dot(first, m)), (dot(second, u), dot(second, v), dot(second, m))
     faces = (2 * face + (1 if sign > 0.0 else 0)) * 6 + 2 * incident + (1 if side > 0.0 else 0)
     origin, kind, start, deepest = add(center, scale(half[face], m)), 3 if ref_is_a else 4, count, (0.0, 0.0, 1e300)
+    near = ALIGNED * (sides[0] + sides[1] + _extent(e1) + _extent(e2))
     for number in range(25):
-        inside, corner = _corner_of_overlap(number, c, e1, e2, sides)
+        inside, corner = _corner_of_overlap(number, c, e1, e2, sides, near)
         if number < 4 and corner[2] < deepest[2]:
             deepest = corner
         if number == 24:  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
@@ -251,16 +253,17 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, m
 
 
 @kernel
-def _corner_of_overlap(number, c, e1, e2, sides):
+def _corner_of_overlap(number, c, e1, e2, sides, near):
     """Return whether candidate `number` is a corner of the overlap, and its (x, y, h).
 
-    0-3 incident corners in the rectangle (its border included), 4-7 reference corners strictly inside the
-    parallelogram, 8-23 crossings strictly inside both edges. Faces that coincide thus give four points.
+    0-3 incident corners in the rectangle, 4-7 reference corners in the parallelogram, 8-23 crossings of two edges. What
+    lies within a multiple of `near` [m] of a border, as rounding has it where edges are aligned, is a corner once:
+    an incident one if it can be, else a reference one. Faces that coincide thus give four points.
     """
     first, second = 1.0 - 2.0 * (number & 1), 1.0 - (number & 2)
     if number < 4:
         corner = add(add(c, scale(first, e1)), scale(second, e2))
-        return abs(corner[0]) <= sides[0] and abs(corner[1]) <= sides[1], corner
+        return abs(corner[0]) <= sides[0] + 4.0 * near and abs(corner[1]) <= sides[1] + 4.0 * near, corner
     if number < 8:
         x, y = first * sides[0], second * sides[1]
         area = e1[0] * e2[1] - e1[1] * e2[0]
@@ -268,15 +271,24 @@ def _corner_of_overlap(number, c, e1, e2, sides):
             return False, c
         alpha = ((x - c[0]) * e2[1] - (y - c[1]) * e2[0]) / area
         beta = (e1[0] * (y - c[1]) - e1[1] * (x - c[0])) / area
-        return abs(alpha) < 1.0 and abs(beta) < 1.0, (x, y, c[2] + alpha * e1[2] + beta * e2[2])
+        beyond, over = (abs(alpha) - 1.0) * _extent(e1), (abs(beta) - 1.0) * _extent(e2)
+        inside = max(beyond, over) <= 2.0 * near and min(beyond, over) < -2.0 * near
+        return inside, (x, y, c[2] + alpha * e1[2] + beta * e2[2])
     # the edge c + first·e1 + β e2, β in (-1, 1), or c + first·e2 + α e1
     start, e = (add(c, scale(first, e1)), e2) if number & 4 else (add(c, scale(first, e2)), e1)
     k = 0 if number & 8 else 1  # with the side x = ± sides[0] of the rectangle, or y = ± sides[1]
-    if e[k] == 0.0:
+    if abs(e[k]) <= near:
         return False, c
     t, along = (second * sides[k] - start[k]) / e[k], second * sides[k]
     across, h = start[1 - k] + t * e[1 - k], start[2] + t * e[2]
-    return abs(t) < 1.0 and abs(across) < sides[1 - k], (along, across, h) if k == 0 else (across, along, h)
+    crosses = (abs(t) - 1.0) * _extent(e) < -near and abs(across) < sides[1 - k] - near
+    return crosses, (along, across, h) if k == 0 else (across, along, h)
+
+
+@kernel
+def _extent(e):
+    """Return the larger coordinate of an edge in the face."""
+    return max(abs(e[0]), abs(e[1]))
 
 
 @kernel

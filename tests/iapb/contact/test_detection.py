@@ -201,6 +201,21 @@ def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_tak
         assert sorted(level.feature.tolist()) == sorted(found.feature.tolist())
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.5 * np.pi, np.pi])
+@pytest.mark.parametrize("offset", [(0.4, 0.0), (0.0, -0.3), (0.0, 0.0), (0.25, 0.1)])
+@pytest.mark.parametrize("noise", [0.0, 1e-16, -1e-16, 1e-13])
+def test_aligned_cubes_touch_at_the_corners_of_their_overlap(turn: float, offset: tuple[float, float],
+                                                             noise: float) -> None:  # fmt: skip
+    """Edges that lie on one another lose no corner to rounding, and count none twice."""
+    x, y = offset
+    place = [x + noise, y - noise, 1.0 - 1e-6, noise, noise, np.sin(0.5 * turn), np.cos(0.5 * turn)]
+    system = pair_of({**CUBE, "size": [1.0, 1.0, 1.0]}, {**CUBE, "size": [1.0, 1.0, 1.0]})
+    found = system.contacts_at(at_places(system, place, [0, 0, 0, 0, 0, 0, 1]), 0.0)
+    ends = [sorted((max(o, 0.0) - 0.5, min(o, 0.0) + 0.5)) for o in offset]
+    wanted = sorted((a, b) for a in ends[0] for b in ends[1])
+    np.testing.assert_allclose(sorted(map(tuple, found.point[:, :2].round(9))), wanted, atol=1e-8)
+
+
 @SPACES
 def test_every_side_of_a_box_that_a_ball_can_touch_has_a_name_of_its_own(space: bool) -> None:
     """8 regions around a rectangle, 26 around a cuboid; inside, those of the faces."""
