@@ -27,6 +27,7 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
+from iapb.scene.bodies import inertia_matrix
 from iapb.scene.parts import LARGEST_NUMBER, written
 from iapb.schema import zeros_of
 
@@ -288,7 +289,7 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
     chosen: Any = laws.ImpulseAugmented() if law is None else law
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
     start, uses = Start(settled(scene)[0]), frozenset[str](getattr(chosen, "uses", ()))
-    found = [*_degrees(scene), *_overlaps(start), *_fast(start)]
+    found = [*_degrees(scene), *_inertias(scene), *_overlaps(start), *_fast(start)]
     if laws.PENALTY in uses:
         found += _sags(start)
     integrator = getattr(chosen, "integrator", "semi_implicit_euler")
@@ -323,6 +324,16 @@ def _degrees(scene: Scene) -> Iterator[Caution]:
                           f"like degrees: set {math.radians(angle):.6g}, for angles are in radians")
 
 
+def _inertias(scene: Scene) -> Iterator[Caution]:
+    """Warn of moments of inertia that no body has: the largest one exceeds the sum of the others by a thousandth."""
+    for i, body in enumerate(scene.bodies if isinstance(scene, SpatialScene) else ()):
+        low, middle, high = np.linalg.eigvalsh(inertia_matrix(body.inertia)).tolist()
+        if high > 1.001 * (low + middle):
+            path = ("bodies", i, "inertia")
+            yield Caution("inertia", written(path), f"{scene.place_of(*path)}{written(path)}: no body has a moment of "
+                          f"{high:.3g} kg m2 beside {low:.3g} and {middle:.3g}; it is at most their sum")
+
+
 def _overlaps(start: Start) -> Iterator[Caution]:
     """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the shape."""
     found, sides, resting = start.found, dict[int, list[int]](), np.zeros(len(start.rows))
@@ -344,7 +355,8 @@ def _overlaps(start: Start) -> Iterator[Caution]:
             says, remedy = f"{says}no joint can move it out", f"{remedy}, or take the shape or the wall away"
         else:
             stored = 0.5 * start.scene.contact.stiffness * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
-            says += f"{stored:.3g} J in the contact's spring throw it out"
+            thrown = f"{stored:.3g} J in the contact's spring throw it out"
+            says += thrown if start.scene.contact.forces == "paper" else "the contact pushes it out"
         yield Caution(kind, f"{a} and {b}", f"{says}{remedy}")
     for rows_of_body in sides.values():
         for n, i in enumerate(rows_of_body):

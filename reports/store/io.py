@@ -218,7 +218,8 @@ def _check_seal(path: Path) -> None:
         raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
     size = path.stat().st_size - _LENGTH
     if size < 0 or not mark.startswith(_MARK):
-        raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb")
+        raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb; "
+                           "iapb store repair sets damaged runs aside")
     if mark != _MARK + _checksum(path, size).encode() + b"\n":
         raise RunFileError(f"{path}: differs from its checksum, the file is damaged")
 

@@ -128,6 +128,14 @@ def test_no_damping_makes_the_midpoint_rule_unstable_at_once() -> None:
     assert limits is not None and limits.stiffness < 1e-3 * MASS / 3.0 / 1e-6
 
 
+@pytest.mark.parametrize(("moments", "kinds"), [([1e-3, 1e-3, 1e-2], ["inertia"]), ([1e-3, 1e-3, 2e-3], []),
+                                                ([0.0, 1e-3, 1e-3], [])])  # fmt: skip
+def test_moments_of_inertia_that_no_body_has_are_named(moments, kinds) -> None:
+    body = {"name": "ball", "joint": "revolute", "mass": 0.5, "inertia": moments, "axis": [0, 0, 1]}
+    spatial = {"name": "made", "dimensions": 3, "rate": 1000, "duration": 0.1, "bodies": [body]}
+    assert [one.kind for one in check_scene(SpatialScene.model_validate(spatial))] == kinds
+
+
 # Degrees
 
 
