@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from collections.abc import Iterator, Mapping, MutableMapping
 from dataclasses import dataclass, replace
@@ -64,15 +65,18 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
     return shlex.join(words + ["--rendering", rendering] * (rendering != "full")) if again == wanted else ""
 
 
+_INDEX = re.compile(r"\[(\d+)\]")  # as messages write a place in a list
+
+
 def parsed(assignments: list[str] | None) -> dict[str, Any]:
-    """Turn ``path=value`` into values by path; values are read as YAML."""
+    """Turn ``path=value`` into values by path (``bodies[0].mass`` or ``bodies.0.mass``); values are read as YAML."""
     values = {}
     for text in assignments or []:
         path, equals, value = text.partition("=")
         if not equals or not path:
             raise ArgumentError("--set", text, "path=value, such as contact.friction=0.3")
         try:
-            values[path.strip()] = Document(value).value
+            values[_INDEX.sub(r".\1", path.strip())] = Document(value).value
         except SceneError as error:
             said = error.mistakes[0].expected
             raise ArgumentError("--set", text, f"a YAML value after the equals sign: {said}") from None

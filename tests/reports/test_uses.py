@@ -11,7 +11,7 @@ from reports import cli
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.pages.records import StoredFile, runs_by_user
 from reports.runner import Runner
-from reports.uses import changes, run_command
+from reports.uses import changes, parsed, run_command
 
 PEG = load_scene(find_scene("peg_corner"))
 CHANGED = {
@@ -19,6 +19,11 @@ CHANGED = {
     "walls.floor.normal": [0.1, -1.0], "device.delay": 1, "gravity": [0.0, 9.81], "couplings.unilateral": None,
     "title": "it's \"quoted\": {a, b} # and more",
 }  # fmt: skip
+
+
+def test_a_place_is_set_as_messages_write_it():
+    named, numbered = (PEG.with_values(parsed([f"{path}=3"])) for path in ("bodies.peg.mass", "bodies[0].mass"))
+    assert named.resolved() == numbered.resolved() != PEG.resolved()
 
 
 @pytest.mark.parametrize("values", [{"duration": 0.4}, CHANGED])
