@@ -156,7 +156,8 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
         yield f"Deepest penetration {deepest(run) * 1e3:.4g} mm."
     yield f"At the end: {_end_of(run)}."
     for remark in run.remarks:
-        yield f"{remark}."
+        if not ("stiffness" in ignored and remark.startswith("chosen for implicit contact")):
+            yield f"{remark}."
     if run.distrust:
         yield f"This result is not to be trusted, because {'; '.join(run.distrust)}."
 
