@@ -192,5 +192,6 @@ def _environment() -> Environment:
 def _labelled(panel: Any) -> Markup:
     """Return a panel with its description: its SVG as an image, or its table."""
     label = Markup('aria-label="{}"').format(panel.alt)
-    return Markup(panel.svg.replace("<svg ", f'<svg role="img" {label} ', 1) if not panel.is_table else
-                  panel.svg.replace("<table ", f"<table {label} ", 1))  # fmt: skip
+    drawn = str(panel.svg)  # not Markup, which would escape what replaces its text
+    return Markup(drawn.replace("<table ", f"<table {label} ", 1) if panel.is_table else
+                  drawn.replace("<svg ", f'<svg role="img" {label} ', 1))  # fmt: skip

@@ -16,6 +16,7 @@ import pytest
 
 from iapb.errors import ArgumentError
 from reports import report
+from reports.figures.figure import Cell, Figure, Panel, Recipe, grid
 from reports.figures.two_link_arm import arm_energies
 from reports.pages.builder import FIRST_PAGE, OUTCOME_MARKS, build_report, link_across
 from reports.pages.formulas import formula, prose
@@ -293,3 +294,10 @@ def test_every_term_of_the_list_is_used_in_the_report() -> None:
              (root / folder).rglob(kind) if path.name != "terms.py"]  # fmt: skip
     text = " ".join(path.read_text(encoding="utf-8") for path in files)
     assert [form for form in TERMS if not re.search(rf"(?<![\w-])(?:{form})(?![\w-])", text)] == []
+
+
+def test_a_figure_that_is_a_table_is_one_on_its_page() -> None:
+    panel = Panel(grid(("a",), {"row": [Cell("x")]}), 'says "x"')
+    recipe = Recipe("t", "", "A table", (), lambda _: Figure("t", "", "A table", "Look.", (panel,)), "accuracy")
+    page = build_report(Evidence(), [recipe])["report/accuracy.html"]
+    assert '<table aria-label="says &#34;x&#34;" class="grid' in page and "&lt;table" not in page
