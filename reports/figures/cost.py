@@ -115,7 +115,7 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
         note(plot.axes, (0.99, 0.04), "IAPB loses", (0, 0), xycoords="axes fraction", ha="right", va="bottom",
              color=FORCE)
         ratios = [row["ratio"] for row in kernels.records() if row["ratio"] is not None]
-        plot.log("contacts", "time of Lemke / time of IAPB", ylim=(0.6 * min(ratios), 2.0 * max(ratios)))
+        plot.log("contacts", "time of Lemke / time of IAPB", ylim=(0.35 * min(ratios), 2.0 * max(ratios)))
         plot.axes.yaxis.set_major_locator(FixedLocator([0.5, 1.0, 2.0, 10.0, 100.0]))
         plot.axes.yaxis.set_major_formatter(FuncFormatter(lambda ratio, _: f"{ratio:g}"))
         plot.axes.xaxis.set_major_locator(FixedLocator([1, 2, 4, 8, 16, 32, 64, 128, 300]))
