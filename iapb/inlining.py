@@ -15,10 +15,11 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from numba import jit, types
+from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.typed_passes import NativeLowering, NopythonTypeInference
 
 # Cost up to which LLVM inlines a call; with its default of 225 the effects of a step are not inlined. Measured on
 # resting steps: 500 and 1,000 are equally fast; from 5,000 on, a step of the peg takes a tenth longer.
@@ -94,18 +95,25 @@ class WholeLowering(NativeLowering):
         return bool(super().run_pass(state))
 
 
+# Of numba's passes, those that a kernel needs: it has no closures, generators, with-blocks or expressions of arrays.
+_PASSES = (untyped_passes.TranslateByteCode, untyped_passes.FixupArgs, untyped_passes.IRProcessing,
+           untyped_passes.RewriteSemanticConstants, untyped_passes.DeadBranchPrune, untyped_passes.GenericRewrites,
+           untyped_passes.ReconstructSSA, untyped_passes.DeadBranchPrune, NopythonTypeInference,
+           typed_passes.PreLowerStripPhis, typed_passes.IRLegalization)
+
+
 class WholeCompiler(CompilerBase):
-    """Compiler of a kernel that Python calls: numba's passes with another lowering, one pipeline, no object mode."""
+    """Compiler of a kernel that Python calls: one short pipeline with another lowering, no object mode."""
 
     lowering: type[NativeLowering] = WholeLowering
 
     def define_pipelines(self) -> list[Any]:
-        """Replace numba's lowering."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        at = next(index for index, (kind, _) in enumerate(passes.passes) if kind is NativeLowering)
-        passes.passes[at] = (self.lowering, "lowering")
-        passes.finalize()
-        return [passes]
+        """Return the passes."""
+        manager = PassManager("kernel")
+        for each in (*_PASSES, self.lowering, typed_passes.NoPythonBackend):
+            manager.add_pass(each, each.name())
+        manager.finalize()
+        return [manager]
 
 
 class BitcodeCompiler(WholeCompiler):
@@ -119,11 +127,11 @@ def compile_as_whole(function: Any, is_absent: Any = lambda kinds: False, otherw
 
     For argument types with is_absent(types), kernels get a third version, which returns the constant `otherwise`.
     """
-    compiled = jit(nopython=True, pipeline_class=WholeCompiler, **options)(function)
+    options |= {"nopython": True, "no_cfunc_wrapper": True}
+    compiled = jit(pipeline_class=WholeCompiler, **options)(function)
 
     def bitcode_of(python: Any) -> Any:
-        made = jit(nopython=True, pipeline_class=BitcodeCompiler, no_cpython_wrapper=True, no_cfunc_wrapper=True,
-                   **options)(python)
+        made = jit(pipeline_class=BitcodeCompiler, no_cpython_wrapper=True, **options)(python)
 
         def add_overload(result: Any) -> None:
             made.overloads[tuple(result.signature.args)] = result

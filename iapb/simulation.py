@@ -18,7 +18,7 @@ from contextlib import suppress
 from functools import lru_cache
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,15 +63,6 @@ def compiled_steps(world, state, port, record, first, steps):  # type: ignore[no
 _STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
 INTERRUPTED = "interrupted"  # value of `Run.stopped` after Ctrl-C
-
-
-class Checkpoint(Protocol):
-    """A function that stores an unfinished run; `due` says whether it should be stored now."""
-
-    @property
-    def due(self) -> bool: ...
-
-    def __call__(self, run: Run) -> object: ...
 
 
 class Simulation:
@@ -263,8 +254,7 @@ class Simulation:
 
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
              world: str = "", steps: int | None = None,
-             progress: Callable[[int, int], None] | None = None,
-             checkpoint: Checkpoint | None = None, max_memory: float | None = None) -> Run:
+             progress: Callable[[int, int], None] | None = None, max_memory: float | None = None) -> Run:
     """Simulate a scene, either with a contact law and a coupling or in a named world, and return the run.
 
     Parameters
@@ -275,7 +265,6 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
         scene's gains. If `law` is given, it is only a name for the record; default: the names of law and coupling.
     steps : number of steps, at least 1; default: the scene's duration times its rate.
     progress : called as progress(steps done, total steps) after every chunk.
-    checkpoint : called with the run so far after a chunk if its ``due`` is true.
     max_memory : largest size of the record [bytes]; ``math.inf`` for no limit; default: half of the machine's memory.
 
     Returns
@@ -295,8 +284,6 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
         ("world", world, isinstance(world, str), "the name of a world, as text"),
         ("steps", steps, steps is None or _is_positive(steps, Integral), "a whole number >= 1"),
         ("progress", progress, progress is None or callable(progress), "a function of the steps done and the total"),
-        ("checkpoint", checkpoint, checkpoint is None or (callable(checkpoint) and hasattr(checkpoint, "due")),
-         "a function of the run, with an attribute `due`"),
         ("max_memory", max_memory, max_memory is None or _is_positive(max_memory, Real),
          "a number of bytes > 0; math.inf for no limit"),
     ):
@@ -311,13 +298,8 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     total = simulation.scene.steps if steps is None else int(steps)
     recorder = Recorder(simulation)
     _check_memory(recorder.bytes_per_step, total, max_memory)
-
-    def keep() -> None:
-        if checkpoint is not None and checkpoint.due:
-            checkpoint(recorder.run(world, "not finished when this was written"))
-
     with compiling_told(to_stderr):
-        stopped = record(recorder, total, progress, keep)
+        stopped = record(recorder, total, progress)
         return recorder.run(world, stopped)
 
 
@@ -380,3 +362,12 @@ def _check_memory(each: int, steps: int, most: float | None) -> None:
 def _bytes(count: float) -> str:
     power = min(int(math.log10(max(count, 1.0)) // 3), 6)
     return f"{count / 1e3**power:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB', 'PB', 'EB')[power]}"
+
+
+def require_complete(run: Run) -> Run:
+    """Return the run if it is complete; otherwise raise the error that stopped it."""
+    if run.complete:
+        return run
+    if run.stopped == INTERRUPTED:
+        raise KeyboardInterrupt
+    raise IapbError(f"{run.scene_name} in the world {run.world} stopped after {run.time[-1]:g} s: {run.stopped}")

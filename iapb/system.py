@@ -38,7 +38,7 @@ from iapb.schema import Floats, blank, quantities, zeros_of
 _factored = Entry(cholesky)
 
 # Effects whose kernels are compiled only where they are on.
-_COMPILED = ("impact_friction", "unequal_restitution", "joint_damping")
+_COMPILED = ("impact_friction", "unequal_restitution", "joint_damping", "clustering", "joint_limits")
 _CONTACT_NUMBERS = ("stiffness", "damping", "friction_velocity", "approach_velocity", "cluster_distance",
                     "coherence_distance")
 
@@ -136,6 +136,7 @@ class System:
             spreading=scaled and law.rendering == "spread",
             contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions", "joint_limits")),
             broad_phase=len(self.pairs) > WORTHWHILE_PAIRS,
+            supports=flag(contact.forces == "implicit" and self.capacity > 1),
         )
         integrator = INTEGRATORS[law.integrator]
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
@@ -147,7 +148,8 @@ class System:
             **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS}, clamped=contact.penalty == "clamped",
             friction_class=self.frictions.class_of_shape, friction=self.frictions.table,
             coulomb=flag("friction" in on and (contact.friction_law == "coulomb" or contact.forces == "implicit")),
-            implicit=flag(contact.forces == "implicit"), tangents=self.tangents,
+            implicit=flag(contact.forces == "implicit"), explicit=flag(contact.forces != "implicit"),
+            tangents=self.tangents,
             restitution=float(self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution),
             own_restitution=scene_parts.restitution_by_shape(scene),
             per_body_rows=contact.self_collision_rows == "per_body",
@@ -212,7 +214,7 @@ class System:
                    "planned": PLANNED if hand is not None and hand.changes else 0}
         port = Port(
             **blank(quantities(Port), lengths), coupling=coupling.kind,
-            device=flag(not isinstance(coupling, NoCoupling)), tool_tree=self.tool_tree,
+            device=flag(not isinstance(coupling, NoCoupling)), hand=flag(hand is not None), tool_tree=self.tool_tree,
             q_start=q_start, q_stop=q_stop, v_start=v_start, v_stop=v_stop,
             hand_body=-1 if hand is None else self.mechanism.index(hand.body),
             device_body=-1 if hand is None else device.index(hand.body),

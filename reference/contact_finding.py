@@ -3,7 +3,7 @@
 This module has the engine's conventions (unit normal from b into a, gap along it, point midway, same choice of points
 for face on face) but shares no code with it. It computes everything in the world frame, searches all edges for a
 polygon's nearest point, and clips faces of boxes by Sutherland and Hodgman. Sums thus have a different order, and a
-fault in one implementation shows as a difference (`verification.mechanics.engine_differences`).
+fault in one implementation shows as a difference (`verification.mechanics.against_pinocchio.scene_difference`).
 
 The normal of two polygons or boxes is the axis of largest separation. For flush pairs, separations agree up to
 rounding, so differences below TIE of the size count as equal. Then b's edge, or a's face, has priority.

@@ -79,6 +79,10 @@ class RigidConstraints:
         """All parameters of a step besides the scene, which gives the coefficients of restitution and friction."""
         return {**asdict(self), "restitution where Newton's law has no solution or gains energy": "Poisson"}
 
+    def cost(self, system: Any) -> Cost:
+        """Return what a step of the law costs in a system."""
+        return cost_of(system)
+
     @one_thread()
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """Do one step (see `iapb.contact.laws.ContactLaw`).

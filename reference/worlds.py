@@ -21,10 +21,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from iapb.errors import IapbError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.simulation import INTERRUPTED, simulate
+from iapb.simulation import require_complete, simulate
 from iapb.worlds import WORLDS, World, find_world
 from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
@@ -70,12 +69,3 @@ def run_world(
 def label_of(name: str, rendering: str) -> str:
     """Return the label of a world and rendering for the record of a run."""
     return name if rendering == "full" else f"{name} {rendering}"
-
-
-def require_complete(run: Run) -> Run:
-    """Return the run if it is complete; otherwise raise the error that stopped it."""
-    if run.complete:
-        return run
-    if run.stopped == INTERRUPTED:
-        raise KeyboardInterrupt
-    raise IapbError(f"{run.scene_name} in the world {run.world} stopped after {run.time[-1]:g} s: {run.stopped}")

@@ -1,7 +1,7 @@
-"""Work in parts: finished parts are not computed again, and the results do not depend on the scheduler.
+"""Work in parts, by a scheduler: `here`, `processes(count)` or `cluster(address)`; results do not depend on which.
 
-`do_missing` skips the finished parts and hands the others to a scheduler: `here`, `processes(count)` or
-`cluster(address)`. Only the parent process handles Ctrl-C: it ends its workers. Results kept before that stay.
+A scheduler is called as scheduler(compute, parts) and yields (part, result) as results come. Only the parent process
+handles Ctrl-C: it ends its workers.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import active_children, get_context
 from threading import Thread
@@ -22,44 +22,17 @@ from typing import Any
 from iapb.compiling import tell_from_worker
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 
+Results = Generator[tuple[Any, Any]]
+Scheduler = Callable[[Callable[[Any], Any], Iterable[Any]], Results]
+
 _LOUD = ("distributed", "distributed.client", "distributed.core", "tornado.application", "asyncio")
-
-# Called as scheduler(compute, parts); yields (part, result) as results come.
-Scheduler = Callable[[Callable[[Any], Any], Iterable[Any]], Generator[tuple[Any, Any]]]
-
 _AHEAD = 4  # parts submitted per worker: enough to keep it busy, few enough that Ctrl-C loses little work
 _CLUSTER_AHEAD = 256  # parts submitted to a cluster at the same time
+_MOST_WORKERS = 4  # a worker of a report holds some 500 MB
 _WATCH = 1.0  # [s] between two checks that the parent is alive
 
 
-def do_missing(
-    parts: Iterable[Any], compute: Callable[[Any], Any], keep: Callable[[Any, Any], None], *,
-    done: Callable[[Any], bool], scheduler: Scheduler, progress: Callable[[int, int], None],
-    size: Callable[[Any], int] = lambda part: 1,
-) -> None:
-    """Compute the parts that are not done yet, and keep each result as it comes.
-
-    Parameters
-    ----------
-    compute : makes the result of a part, in this or another process, as the scheduler decides
-    keep : called as keep(part, result), in this process
-    done : whether the result of a part is kept already
-    progress : called as progress(size done, total size)
-    size : returns the size of a part
-    """
-    every = list(parts)
-    missing = [part for part in every if not done(part)]
-    total = sum(map(size, every))
-    made = total - sum(map(size, missing))
-    progress(made, total)
-    with closing(scheduler(compute, missing)) as results:
-        for part, result in results:
-            keep(part, result)
-            made += size(part)
-            progress(made, total)
-
-
-def here(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
+def here(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Results:
     """Compute in this process, one after the other."""
     for part in parts:
         yield part, compute(part)
@@ -68,20 +41,11 @@ def here(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple
 def processes(workers: int) -> Scheduler:
     """Compute in `workers` processes of this machine; results come in the order in which they finish."""
 
-    def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
+    def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Results:
         with worker_pool(workers) as pool:
             yield from _as_they_finish(pool, compute, parts, workers * _AHEAD)
 
     return schedule
-
-
-def _as_they_finish(
-    pool: Executor, compute: Callable[[Any], Any], parts: Iterable[Any], ahead: int
-) -> Generator[tuple[Any, Any]]:
-    left, running = iter(parts), dict[Future[Any], Any]()
-    while running := running | {pool.submit(compute, part): part for part in islice(left, ahead - len(running))}:
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            yield running.pop(future), future.result()
 
 
 def cluster(address: str) -> Scheduler:
@@ -95,10 +59,19 @@ def cluster(address: str) -> Scheduler:
         No scheduler answers.
     """
 
-    def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Generator[tuple[Any, Any]]:
-        client = _client(address)
-        from distributed.comm import CommClosedError
-
+    def schedule(compute: Callable[[Any], Any], parts: Iterable[Any]) -> Results:
+        try:
+            from distributed import Client
+            from distributed.comm import CommClosedError
+        except ImportError as error:
+            raise MissingDependencyError("distributed", "A sweep on a cluster",
+                                         "pip install 'iapb[cluster]'") from error
+        for name in _LOUD:  # if the scheduler dies, print one sentence of ours without dask's tracebacks
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        try:
+            client = Client(address, timeout="10s")
+        except (OSError, ValueError, TimeoutError) as error:
+            raise ArgumentError("--scheduler", address, "the address of a running dask scheduler") from error
         try:  # pure=False, because `compute` writes a file
             yield from _as_they_finish(client.get_executor(pure=False), compute, parts, _CLUSTER_AHEAD)
         except (CommClosedError, CancelledError) as error:
@@ -110,17 +83,11 @@ def cluster(address: str) -> Scheduler:
     return schedule
 
 
-def _client(address: str) -> Any:
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise MissingDependencyError("distributed", "A sweep on a cluster", "pip install 'iapb[cluster]'") from error
-    for name in _LOUD:  # if the scheduler dies, print one sentence of ours without dask's tracebacks
-        logging.getLogger(name).setLevel(logging.CRITICAL)
-    try:
-        return Client(address, timeout="10s")
-    except (OSError, ValueError, TimeoutError) as error:
-        raise ArgumentError("--scheduler", address, "the address of a running dask scheduler") from error
+def _as_they_finish(pool: Executor, compute: Callable[[Any], Any], parts: Iterable[Any], ahead: int) -> Results:
+    left, running = iter(parts), dict[Future[Any], Any]()
+    while running := running | {pool.submit(compute, part): part for part in islice(left, ahead - len(running))}:
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            yield running.pop(future), future.result()
 
 
 @contextmanager
@@ -139,13 +106,27 @@ def starting_a_process() -> Iterator[None]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """A process pool that starts its workers on demand, in `submit`, with SIGINT blocked."""
+    """A process pool that starts its workers on demand, in `submit`, with SIGINT blocked.
 
+    said : what the workers say by `tell_parent`
+    """
+
+    said: Any
     submit = starting_a_process()(ProcessPoolExecutor.submit)
 
 
-def _begin(told: Any, parent: int) -> None:
+_said: Any = None  # in a worker: where the parent reads
+
+
+def tell_parent(message: Any) -> None:
+    """Send a message from a worker; the parent reads `said` of its pool."""
+    _said.put(message)
+
+
+def _begin(told: Any, said: Any, parent: int) -> None:
     """Initialise a worker; it exits when its parent is gone, instead of waiting forever."""
+    global _said
+    _said = said
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -156,8 +137,13 @@ def _begin(told: Any, parent: int) -> None:
     tell_from_worker(told)
 
 
+def cores() -> int:
+    """Return the number of worker processes that are worth starting on this machine."""
+    return min(_MOST_WORKERS, len(os.sched_getaffinity(0)))
+
+
 @contextmanager
-def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(count: int) -> Iterator[_Pool]:
     """Yield a pool of `count` processes with the start method "spawn"; any exception terminates them at once.
 
     The first worker that compiles a kernel prints a message.
@@ -168,8 +154,9 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
         A worker was killed, for example because memory ran out.
     """
     others, context = set(active_children()), get_context("spawn")
-    told = context.Value("b", False)
-    pool = _Pool(count, mp_context=context, initializer=_begin, initargs=(told, os.getpid()))
+    told, said = context.Value("b", False), context.SimpleQueue()
+    pool = _Pool(count, mp_context=context, initializer=_begin, initargs=(told, said, os.getpid()))
+    pool.said = said
     try:
         yield pool
     except BrokenProcessPool as error:

@@ -13,18 +13,9 @@ from iapb.names import nearest
 
 
 def function_named(argument: str, name: str, form: str = "package.module:function") -> Callable[..., Any]:
-    """Import a function; the working directory is searched, too.
+    """Import a function, also from the working directory; raise ArgumentError if that fails.
 
-    Parameters
-    ----------
-    argument : the command-line option that the name was given for, such as ``--resolver``
-    name : module, colon, function
-    form : the expected form of the name, for error messages
-
-    Raises
-    ------
-    ArgumentError
-        The name has another form, the module cannot be imported, or the module has no such function.
+    argument : the command-line option that the name was given for; form : the expected form of the name
     """
     module, colon, attribute = name.partition(":")
     if not (module and colon and attribute):

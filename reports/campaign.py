@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from reports.batches import do_missing, here, processes
+from reports.batches import here, processes
 from reports.counterexamples import CampaignRequest, keep_counterexample
 from reports.store.io import mark_store
 from reports.store.tables import read_record, write_record
@@ -39,14 +40,19 @@ class Campaign:
 
     def run(self, batches: Iterable[Batch], progress: Callable[[str, int, int], None]) -> None:
         """Compute the batches that have no file yet, part by part."""
-        parts: dict[str, list[Batch]] = {}
-        for batch in batches:
-            parts.setdefault(batch.part, []).append(batch)
+        every = list(batches)
         scheduler = here if self.request.workers == 1 else processes(self.request.workers)
-        for part, own in parts.items():
-            do_missing(own, partial(outcome_of, self.request), self._keep,
-                       done=lambda batch: self.path_of(batch).is_file(), scheduler=scheduler,
-                       progress=partial(progress, part), size=lambda batch: batch.count)  # fmt: skip
+        for part in dict.fromkeys(batch.part for batch in every):
+            own = [batch for batch in every if batch.part == part]
+            missing = [batch for batch in own if not self.path_of(batch).is_file()]
+            total = sum(batch.count for batch in own)
+            done = total - sum(batch.count for batch in missing)
+            progress(part, done, total)
+            with closing(scheduler(partial(outcome_of, self.request), missing)) as results:
+                for batch, outcome in results:
+                    self._keep(batch, outcome)
+                    done += batch.count
+                    progress(part, done, total)
 
     def _keep(self, batch: Batch, outcome: BatchOutcome) -> None:
         """Write the counterexamples, at most KEPT_PER_LAW per law in the folder, then the table of the batch.

@@ -12,6 +12,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from functools import wraps
 from importlib import import_module
 from importlib.metadata import version
+from itertools import pairwise
 from typing import Any, cast
 
 import typer
@@ -45,12 +46,7 @@ COMMANDS = {
 MANY_SCENES = ("verify", "bench", "sweep", "store", "reproduce")
 
 COMPLETION = "_IAPB_COMPLETE"  # set while a shell asks for completions
-
-
-class _Options:
-    """Options before the command."""
-
-    debug = False
+STOPPED = "stopped; files that were complete stay"
 
 
 def _version(asked: bool) -> None:
@@ -63,7 +59,7 @@ def _before(
     debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error."),
     version_: bool = typer.Option(False, "--version", help="Print the version.", callback=_version, is_eager=True),
 ) -> None:
-    _Options.debug = debug
+    """Take the options before the command; `main` looks for --debug itself."""
 
 
 def _app(given: list[str]) -> typer.Typer:
@@ -81,26 +77,24 @@ def _app(given: list[str]) -> typer.Typer:
     if wanted in MANY_SCENES:
         os.environ.setdefault("IAPB_COMPILE", "whole")
     for name, words in COMMANDS.items():
-        command = getattr(import_module(f"reports.commands.{name}"), name) if name == wanted else _not_given
-        app.command(name, help=None if name == wanted else words)(_abortable(command))
+        if name == wanted:
+            app.command(name)(_answering(getattr(import_module(f"reports.commands.{name}"), name)))
+        else:
+            app.command(name, help=words)(lambda: None)  # only listed in the help
     return app
 
 
-def _not_given() -> None:
-    """Do nothing; this is the placeholder for commands that are only listed in the help."""
-
-
-def _abortable(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give the answer of a command; turn KeyboardInterrupt into typer.Abort, which reaches `main`."""
+def _answering(command: Callable[..., Any]) -> Callable[..., int]:
+    """Print the answer of a command and return its status; Ctrl-C becomes typer.Abort, which reaches `main`."""
 
     @wraps(command)
-    def call(*arguments: Any, **options: Any) -> Any:
+    def call(*arguments: Any, **options: Any) -> int:
         try:
             answer = command(*arguments, **options)
         except KeyboardInterrupt:
             raise typer.Abort from None
-        if answer is not None:
-            answer.give(options.get("json_", False))
+        print(answer.text(options.get("json_", False)))
+        return int(answer.status)
 
     return call
 
@@ -145,40 +139,38 @@ def main(arguments: list[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, _end_politely)
     out, err = cast(Any, Harmless(sys.stdout, _COLOUR)), cast(Any, Harmless(sys.stderr, _BARS))
     with redirect_stdout(out), redirect_stderr(err):
-        status = _main(sys.argv[1:] if arguments is None else arguments)
+        status = _status(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
         sys.exit(status)
     return status
 
 
-def _main(given: list[str]) -> int:
+def _status(given: list[str]) -> int:
+    """Run the command line and return its status. A usage error of typer's is known by its attributes, since typer
+    has its own copy of click or the installed one; any other unnamed error is a bug and raised."""
+    explained = False
     try:
         _refuse_empty(given)
-        status = _app(given)(args=given, prog_name="iapb", standalone_mode=False)
-    except KeyboardInterrupt:
-        status = _failed(given, 130, STOPPED)
+        return _app(given)(args=given, prog_name="iapb", standalone_mode=False) or 0
+    except (KeyboardInterrupt, typer.Abort):
+        status, said = 130, STOPPED
     except (IapbError, OSError) as error:
-        if _Options.debug:
+        if "--debug" in given:
             raise
-        status = _failed(given, 1, _sentence(error))
+        status, said = 1, str(error)
+        if isinstance(error, OSError) and error.filename is not None and error.strerror:
+            said = f"{error.filename}: {error.strerror}"
     except Exception as error:
-        status = _usage(given, error)
-    return status or 0
-
-
-STOPPED = "stopped; files that were complete stay"
-
-
-def _failed(given: list[str], status: int, sentence: str) -> int:
-    """Print an error and return the status. With --json, also print it as an object on standard output."""
-    print(f"iapb: {harmless(sentence)}", file=sys.stderr)
-    _as_json(given, status, sentence)
-    return status
-
-
-def _as_json(given: list[str], status: int, sentence: str) -> None:
+        usage: Any = error
+        if not (hasattr(usage, "show") and hasattr(usage, "exit_code")):
+            raise
+        usage.show(file=sys.stderr)
+        status, said, explained = usage.exit_code, usage.format_message(), True
+    if not explained:
+        print(f"iapb: {harmless(said)}", file=sys.stderr)
     if "--json" in given:
-        print(json.dumps({"error": sentence, "status": status}, indent=1, ensure_ascii=False))
+        print(json.dumps({"error": said, "status": status}, indent=1, ensure_ascii=False))
+    return status
 
 
 def _end_politely(*_: object) -> None:
@@ -189,36 +181,13 @@ def _end_politely(*_: object) -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-def _refuse_empty(arguments: list[str]) -> None:
+def _refuse_empty(given: list[str]) -> None:
     """Refuse empty values: a shell makes one of an unset variable, and as a path it would mean this folder."""
-    for i, text in enumerate(arguments):
-        before = arguments[i - 1] if i and arguments[i - 1].startswith("--") else f"argument {i + 1}"
-        name = before if not text else text[:-1]
-        if not text or (text.startswith("--") and text.find("=") == len(text) - 1):
+    for i, (before, word) in enumerate(pairwise(["", *given]), 1):
+        option, equals, value = word.partition("=") if word.startswith("--") else ("", "", "")
+        if not word or (equals and not value):
+            name = option or (before if before.startswith("--") else f"argument {i}")
             raise ArgumentError(name, "", "a value that is not empty (a shell variable that is not set?)")
-
-
-def _sentence(error: IapbError | OSError) -> str:
-    """Return the message of an error; for an OSError "file: reason", without the error number."""
-    if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
-
-
-def _usage(given: list[str], error: Exception) -> int:
-    """Print a usage error and return its status; raise any other error again, because it is a bug.
-
-    Usage errors are recognised by their attributes `show` and `exit_code`, not by their class: typer uses either its
-    own copy of click or the installed one.
-    """
-    if isinstance(error, typer.Abort):
-        return _failed(given, 130, STOPPED)
-    show, status = getattr(error, "show", None), getattr(error, "exit_code", None)
-    if show is None or status is None:
-        raise error
-    show(file=sys.stderr)
-    _as_json(given, int(status), str(getattr(error, "format_message", error.__str__)()))
-    return int(status)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,6 @@ from reports.store.impact import BrokenImpact, read_broken_impact, write_broken_
 from reports.store.io import opened
 from reports.store.keys import code_version, hash_of, sources_hash
 from reports.store.tables import TABLE_FORMAT, read_record, write_record
-from verification.impacts import ImpactCase
 from verification.laws import bounds
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, PARTS, UNEQUAL, Found, Subject, drawn, residuals
@@ -76,24 +75,18 @@ def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) ->
         record = {**origin, "law": found.law, "value": found.residual.value, "tolerance": found.residual.tolerance,
                   "case": found.case}  # fmt: skip
         return write_record(path, record, found.law, command=recheck_command(Path(path.name), request.resolver))
-    _write_fclib(path.with_suffix(".hdf5"), found.struck.case)
-    subject = request.subject()
+    case, subject, law = found.struck.case, request.subject(), (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law]
+    e, fclib = case.given_restitution(), path.with_suffix(".hdf5")
+    if case.contacts and np.min(e) >= 0.0:
+        try:
+            write_fclib(fclib, ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, e,
+                                                         name=path.stem))
+        except IapbError:  # FCLIB cannot express this extreme input; the run has it
+            fclib.unlink(missing_ok=True)
     return write_broken_impact(path, BrokenImpact(
-        found.struck, ENGINE if found.law in ENGINE_LAWS else request.resolver, found.law,
-        (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law].statement, found.residual.value, found.residual.tolerance,
-        origin, as_test(found.struck.case, found.law, subject.bounds, subject.resolver)))  # fmt: skip
-
-
-def _write_fclib(path: Path, case: ImpactCase) -> None:
-    """Write the impact in the FCLIB format if it can express it: with contacts and a restitution in [0, 1]."""
-    e = case.given_restitution()
-    if case.contacts == 0 or np.min(e) < 0.0:
-        return
-    try:
-        problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, e, name=path.stem)
-        write_fclib(path, problem)
-    except IapbError:  # FCLIB cannot express this extreme input; the run has it
-        path.unlink(missing_ok=True)
+        found.struck, ENGINE if found.law in ENGINE_LAWS else request.resolver, found.law, law.statement,
+        found.residual.value, found.residual.tolerance, origin,
+        as_test(case, found.law, subject.bounds, subject.resolver)))  # fmt: skip
 
 
 def recheck_command(path: Path, resolver: str) -> str:
@@ -117,18 +110,17 @@ def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResi
     """
     with opened(path, expected_format=None) as file:
         is_record = file.attrs.get("format") == TABLE_FORMAT
-    broken = None if is_record else read_broken_impact(path)
     if is_record:
         record = read_record(path)
         yield _judged(path, str(record["law"]), record, None, allow_code)
-    elif broken is not None:
+    elif broken := read_broken_impact(path):
         yield _judged(path, broken.law, broken.found, broken.struck.case, allow_code)
     else:  # the laws on the stored arrays, then on the same scene simulated again
         run = read_run(path)
-        yield from ((f"as recorded: {law}", residual) for law, residual in judge_run(run))
         world, _, rendering = run.world.partition(" ")
         again = run_world(scene_from_text(run.scene_source), world, rendering or "full", partial=True)
-        yield from ((f"simulated again: {law}", residual) for law, residual in judge_run(again))
+        for how, judged in (("as recorded", run), ("simulated again", again)):
+            yield from ((f"{how}: {law}", residual) for law, residual in judge_run(judged))
 
 
 def _judged(path: Path, law: str, origin: dict[str, Any], case: Any, allow_code: bool) -> tuple[str, LawResidual]:

@@ -70,7 +70,7 @@ class Difference:
 
     def count(self, state: str) -> int:
         """Return the number of cells in a state."""
-        return len(self.of(state))
+        return sum(cell.state == state for cell in self.cells)
 
     def of(self, state: str) -> tuple[Cell, ...]:
         """Return the cells in a state, the largest gap first."""

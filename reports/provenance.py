@@ -16,7 +16,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from iapb.errors import MissingDependencyError
-from reference.simulators import find_simulator
+from iapb.lazy import needed
 
 _ROOT = Path(__file__).resolve().parent.parent
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py")
@@ -27,32 +27,18 @@ UNKNOWN = "unknown"
 NOT_INSTALLED = "not installed"
 
 
-def collect_provenance(
-    seeds: Sequence[int | str] = (), command: str | None = None, threads: int | None = None,
-    packages: Sequence[str] = (),
-) -> dict[str, str]:
+def collect_provenance(seeds: Sequence[int | str] = (), packages: Sequence[str] = ()) -> dict[str, str]:
     """Return the facts needed to reproduce a result, as texts by name.
 
     Parameters
     ----------
-    seeds
-        Seeds of the random numbers used, if any, each with or without its name.
-    command
-        The command that reproduces the result; by default the current one, without machine paths.
-    threads
-        Number of threads used; by default not stated.
-    packages
-        Further packages whose versions are stated, besides those that every result depends on.
+    seeds : seeds of the random numbers used, if any, each with or without its name.
+    packages : further packages whose versions are stated, besides those that every result depends on.
     """
-    facts = _facts().copy()
-    facts["seeds"] = ", ".join(str(seed) for seed in seeds) or "none"
-    facts["command"] = current_command() if command is None else command
-    if threads is not None:
-        facts["threads"] = str(threads)
-    for package in packages:
-        found = package_version(package)
-        facts[package] = NOT_INSTALLED if found == UNKNOWN else found
-    return facts
+    given = {"seeds": ", ".join(map(str, seeds)) or "none", "command": current_command()}
+    versions = {package: package_version(package) for package in packages}
+    return _facts() | given | {package: NOT_INSTALLED if found == UNKNOWN else found
+                               for package, found in versions.items()}  # fmt: skip
 
 
 def current_command() -> str:
@@ -86,8 +72,11 @@ def _facts() -> dict[str, str]:
 
 def package_version(package: str) -> str:
     """Return the version of an installed package, or ``unknown``."""
-    try:  # Siconos runs in the system's Python, not in this one: its adapter knows the version
-        return find_simulator("siconos").version() if package == "siconos" else version(package)
+    try:
+        if package != "siconos":
+            return version(package)
+        simulators = needed("reference.simulators", "The version of Siconos")
+        return str(simulators.find_simulator("siconos").version())  # it runs in the system's Python: its adapter knows
     except (PackageNotFoundError, MissingDependencyError):
         return UNKNOWN
 

@@ -2,14 +2,18 @@
 
     pages = build_report(Evidence(inputs=..., claims=..., ...))
     write_report("out", pages)
+
+A report whose sources, results and files have not changed is not made again: its answer is kept beside its tables.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,16 +21,19 @@ from typing import Any
 
 from iapb.errors import ArgumentError
 from reports.crate import write_crate
+from reports.evidence.depends import FOLDERS, PACKAGES, depends_of, folder_hash
 from reports.figures.figure import Figure, NotComputed, Recipe
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.builder import FIRST_PAGE
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
-from reports.provenance import uncommitted_changes
+from reports.provenance import PEERS, collect_provenance, uncommitted_changes
+from reports.store.keys import evidence_version, hash_of, plain, sources_hash
 from verification.finding import Failure, attempt
 
 LARGEST_FIRST, LARGEST_ARCHIVE = 1_000_000, 4_000_000  # bytes: a report that cannot be mailed is not read
 ARCHIVE_NAME, DIRTY_NAME = "report.zip", "dirty.diff"
+ANSWER = "tables/answer.json"  # what the command said of the finished report
 _TEXTS = {
     FIRST_PAGE: "the report's first page",
     **{section.page: f"the report: {section.title}" for section in SECTIONS},
@@ -90,3 +97,36 @@ def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure
         written.append(changed)
     beside = {name: text for name, text in _TEXTS.items() if (out / name).is_file()}
     return (*written, write_crate(out, beside, evidence.manifest, evidence.provenance))
+
+
+def report_key(out: Path, depth: str) -> str:
+    """Return a hash of what a report in `out` is made from, besides its files: code, machine, packages, command."""
+    folder = Path(__file__).parent / "pages"
+    return hash_of({
+        "folder": str(out.absolute()), "depth": depth, "code": [evidence_version(), sources_hash("reports")],
+        "pages": [folder_hash(folder / part) for part in ("templates", "scripts")], "changes": uncommitted_changes(),
+        "depends": {stage: depends_of(stage) for stage in (*FOLDERS, *PACKAGES, "proofs")},
+        "facts": collect_provenance(packages=PEERS),
+    })  # fmt: skip
+
+
+def keep_answer(out: Path, key: str, facts: Mapping[str, Any], lines: Sequence[str], made_from: Iterable[str]) -> None:
+    """Keep the answer of a finished report and the state of its files; paths are relative to `out`."""
+    kept = {"key": key, "facts": facts, "lines": lines, "files": _states(out, (*made_from, *_TEXTS))}
+    (out / ANSWER).write_text(json.dumps(plain(kept)), encoding="utf-8")
+
+
+def kept_answer(out: Path, key: str) -> tuple[dict[str, Any], list[str]] | None:
+    """Return the facts and lines that were kept with this key, or None if a file of the report has changed since."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        kept = json.loads((out / ANSWER).read_text(encoding="utf-8"))
+        if kept["key"] == key and kept["files"] == _states(out, kept["files"]):
+            return kept["facts"], kept["lines"]
+    return None
+
+
+def _states(out: Path, names: Iterable[str]) -> dict[str, list[int]]:
+    """Return size and time of the last change of each file that exists; [] for the others."""
+    paths = {name: out / name for name in names}
+    found = {name: path.stat() for name, path in paths.items() if path.exists()}
+    return {name: [found[name].st_size, found[name].st_mtime_ns] if name in found else [] for name in paths}

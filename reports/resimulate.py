@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
@@ -17,7 +18,7 @@ from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.model import scene_kind
 from iapb.simulation import simulate
-from reference.worlds import WORLDS, find_world
+from iapb.worlds import find_world
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
 from reports.store.runs import read_run
 
@@ -51,7 +52,6 @@ class Change:
 class Repetition:
     """The comparison of a stored run with its repetition: both content hashes, and the results that differ."""
 
-    file: str
     stored: str
     again: str
     differs: tuple[Change, ...]
@@ -74,7 +74,7 @@ def repeat_run(path: Path | str) -> Repetition:
     """
     stored = read_run(path)
     again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world, steps=stored.steps)
-    return Repetition(str(path), content_hash(stored), content_hash(again), differences(stored, again))
+    return Repetition(content_hash(stored), content_hash(again), differences(stored, again))
 
 
 def scene_of(run: Run) -> Scene:
@@ -88,9 +88,10 @@ def law_of(run: Run) -> Any:
     """Return the contact law of a run with its settings: one of LAWS, or the law of the run's world."""
     if run.law in LAWS:
         module, name = LAWS[run.law]
-        kind = getattr(import_module(module), name)
-        return kind(**_known(kind, run.law_settings))
-    law: Any = find_world(run.world).law if run.world in WORLDS else None
+        return _made(getattr(import_module(module), name), run.law_settings)
+    law: Any = None
+    with suppress(ArgumentError):  # a world of one's own
+        law = find_world(run.world).law
     law = law.within(scene_of(run)) if hasattr(law, "within") else law
     if law is None or (law.name, dict(law.settings)) != (run.law, dict(run.law_settings)):
         raise ArgumentError("law", run.law,
@@ -102,16 +103,15 @@ def coupling_of(run: Run) -> Coupling:
     """Return the coupling of a run with its gains."""
     if run.coupling not in COUPLINGS:
         raise ArgumentError("coupling", run.coupling, one_of(run.coupling, COUPLINGS))
-    kind = COUPLINGS[run.coupling]
-    settings = _known(kind, run.coupling_settings)
-    made: Coupling = kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in settings.items()})
+    made: Coupling = _made(COUPLINGS[run.coupling], run.coupling_settings)
     return made
 
 
-def _known(kind: Any, settings: Any) -> dict[str, Any]:
-    """Return the settings that are constructor parameters; the other ones only describe the law."""
+def _made(kind: Any, settings: Any) -> Any:
+    """Return a law or coupling with those settings that it takes; the other ones only describe it."""
     names = {field.name for field in fields(kind) if field.init}
-    return {name: value for name, value in settings.items() if name in names}
+    return kind(**{name: tuple(value) if isinstance(value, list) else value
+                   for name, value in settings.items() if name in names})  # fmt: skip
 
 
 def differences(stored: Run, again: Run) -> tuple[Change, ...]:

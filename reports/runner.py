@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial as given
@@ -11,19 +11,17 @@ from typing import Any
 
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.simulation import Simulation
-from reference import worlds
+from iapb.simulation import Simulation, require_complete, simulate
+from iapb.worlds import find_world
 from reference.one_thread import one_thread
-from reports.batches import worker_pool
+from reports.provenance import machine_of, this_machine
 from reports.store.folder import Place, RunStore
 from reports.store.io import mark_store
-from reports.store.runs import RunEntry
-from reports.streaming import stream
+from reports.store.runs import RunEntry, read_provenance
+from reports.streaming import Stream
 from reports.uses import UsedRun, add_use, run_command
-from verification.finding import attempt
 
 Progress = Callable[[int, int], None]
-Wanted = tuple[Scene, str, str]
 Fetched = tuple[Run, RunEntry]
 
 
@@ -44,6 +42,7 @@ class Runner:
         self.user = ""  # the user recorded for the runs requested now
         self._held: dict[str, Fetched] = {}
         self._known: dict[str, UsedRun] = {}
+        self._made_here: set[str] = set()
         self._places: dict[tuple[int, str, str], tuple[Place, Scene]] = {}
 
     def __call__(
@@ -56,7 +55,7 @@ class Runner:
         """
         run, entry = self.fetch(scene, world, rendering, keep=keep)
         if not partial:
-            worlds.require_complete(run)
+            require_complete(run)
         self._know(entry, scene, world, rendering)
         self.use_again(scene, world, rendering)
         return run
@@ -66,7 +65,11 @@ class Runner:
         place = self._place(scene, world, rendering)
         if place.path.name in self._held:
             return self._held[place.path.name]
-        compute = given(worlds.run_world, scene, world, rendering, progress=self.progress, partial=True)
+        if not place.path.is_file():
+            self._made_here.add(place.path.name)
+        found = find_world(world, rendering)
+        compute = given(one_thread()(simulate), scene, found.law, found.coupling_in(scene),
+                        world=_label(world, rendering), progress=self.progress)
         fetched = self.store.fetch(place, compute)
         if keep and fetched[0].complete:
             self._held[place.path.name] = fetched
@@ -75,17 +78,17 @@ class Runner:
     def stream(self, scene: Scene, world: str, rendering: str = "full", *, resume: bool = False) -> tuple[Place, Any]:
         """Simulate and store a run in constant memory; return its place and the outcome, None if the run exists.
 
-        resume : continue, bit for bit, from the log that a stopped or killed process left.
+        resume : continue, bit for bit, from the parts that a stopped or killed process left.
         """
         place = self._place(scene, world, rendering)
         if place.path.is_file():
             return place, None
         mark_store(self.store.folder)
-        found = worlds.find_world(world, rendering)
+        found = find_world(world, rendering)
         simulation = Simulation(scene, found.law, found.coupling_in(scene))
         with one_thread():  # as run_world does
-            return place, stream(place, simulation, worlds.label_of(world, rendering), scene.steps, resume=resume,
-                                 progress=self.progress)  # fmt: skip
+            streamed = Stream(place, simulation, _label(world, rendering), scene.steps)
+            return place, streamed.run(resume, self.progress)
 
     @contextmanager
     def recording(self, user: str) -> Iterator[dict[str, UsedRun]]:
@@ -121,51 +124,30 @@ class Runner:
     def _place(self, scene: Scene, world: str, rendering: str) -> Place:
         asked = id(scene), world, rendering
         if asked not in self._places:  # a key costs a millisecond; the scene is held, so that its id stays its own
-            inputs, label = self.inputs(scene, world, rendering), self.label(scene, world, rendering)
-            self._places[asked] = self.store.place_of(inputs, label), scene
+            found = find_world(world, rendering)
+            inputs = run_inputs(scene, found.law, found.coupling_in(scene), world)
+            self._places[asked] = self.store.place_of(inputs, self.label(scene, world, rendering)), scene
         return self._places[asked][0]
-
-    @contextmanager
-    def crew(self, workers: int) -> Iterator[Callable[[Sequence[Wanted]], Iterator[Run | None]]]:
-        """Yield a function that simulates many runs in `workers` processes, without counting them as used.
-
-        The function yields the runs in the order of its argument, and None for a run that raises or is incomplete.
-        """
-        with worker_pool(workers) as pool:
-
-            def made(wanted: Sequence[Wanted]) -> Iterator[Run | None]:
-                results = pool.map(given(_fetched, str(self.store.folder)), wanted)
-                for asked, fetched in zip(wanted, results, strict=True):
-                    if fetched is not None:
-                        self._know(fetched[1], *asked)
-                    yield fetched and fetched[0]
-
-            yield made
 
     def _know(self, entry: RunEntry, scene: Scene, world: str, rendering: str) -> None:
         name = self.file_of(scene, world, rendering)
         if name not in self._known or self._known[name].file != entry.file:  # a partial run has another file
             command = run_command(scene, world, rendering) or f"iapb store again out/runs/{entry.file}"
-            size = (self.store.folder / entry.file).stat().st_size
+            path = self.store.folder / entry.file
+            machine = this_machine() if name in self._made_here else machine_of(read_provenance(path))
             self._known[name] = UsedRun(self.label(scene, world, rendering), entry.file, entry.run_key,
-                                        entry.content_hash, command, size, entry.status)  # fmt: skip
+                                        entry.content_hash, command, path.stat().st_size, entry.status,
+                                        made_on=machine)  # fmt: skip
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:
         """Return the start of the file's name."""
         return "-".join([scene.name, world] + ([rendering] if rendering != "full" else []))
 
-    @staticmethod
-    def inputs(scene: Scene, world: str, rendering: str = "full") -> dict[str, Any]:
-        """Return everything that determines the run, besides the code."""
-        found = worlds.find_world(world, rendering)
-        return run_inputs(scene, found.law, found.coupling_in(scene), world)
 
-
-def _fetched(folder: str, wanted: Wanted) -> Fetched | None:
-    """Return a run, in a worker process; None if it raises or is incomplete, so that the parent requests it again."""
-    fetched = attempt("run", given(Runner(folder).fetch, *wanted, keep=False), [])
-    return fetched if fetched is not None and fetched[0].complete else None
+def _label(world: str, rendering: str) -> str:
+    """Return world and rendering as `reference.worlds.run_world` records them."""
+    return world if rendering == "full" else f"{world} {rendering}"
 
 
 def run_inputs(scene: Scene, law: Any, coupling: Any, world: str) -> dict[str, Any]:

@@ -29,6 +29,7 @@ class UsedRun:
     size : size of the file [bytes]
     status : COMPLETE, or PARTIAL if the simulation gave up
     used_by : the claims, topics and figure inputs that used the run
+    made_on : processor, BLAS kernel and optional numpy code of the computation
     """
 
     name: str
@@ -39,6 +40,7 @@ class UsedRun:
     size: int
     status: str = COMPLETE
     used_by: tuple[str, ...] = ()
+    made_on: str = ""
 
 
 def add_use(used: MutableMapping[str, UsedRun], run: UsedRun) -> None:
@@ -68,10 +70,10 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
 _INDEX = re.compile(r"\[(\d+)\]")  # as messages write a place in a list
 
 
-def parsed(assignments: list[str] | None) -> dict[str, Any]:
+def parsed(assignments: list[str]) -> dict[str, Any]:
     """Turn ``path=value`` into values by path (``bodies[0].mass`` or ``bodies.0.mass``); values are read as YAML."""
     values = {}
-    for text in assignments or []:
+    for text in assignments:
         path, equals, value = text.partition("=")
         if not equals or not path:
             raise ArgumentError("--set", text, "path=value, such as contact.friction=0.3")

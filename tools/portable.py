@@ -30,6 +30,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from reports.show import table_text
+from verification.table import titled
+
 ROOT = Path.cwd()
 # The numerical tests: all tests except those of documents, browser, live view and tools.
 TESTS = ("tests/iapb", "tests/reference", "tests/verification", "tests/reports",
@@ -109,14 +112,14 @@ def try_setting(name: str, folder: Path, parts: list[str], workers: str) -> dict
     if without := not_in_force(name, facts, machine):
         row["wrong"].append(f"not in force: {without}")
         return row
-    _say(f"{name}: {' '.join(f'{key}={value}' for key, value in setting.items()) or 'nothing set'}; "
-         f"BLAS {'/'.join(facts['blas'])}, {facts['threads']} threads, kernels for {facts['numba']}")  # fmt: skip
+    print(f"{name}: {' '.join(f'{key}={value}' for key, value in setting.items()) or 'nothing set'}; "
+          f"BLAS {'/'.join(facts['blas'])}, {facts['threads']} threads, kernels for {facts['numba']}",
+          file=sys.stderr, flush=True)  # fmt: skip
     for part in parts:
         started = time.perf_counter()
-        row[part], kept = PARTS[part](name, setting, folder, workers)
+        row[part] = PARTS[part](name, setting, folder, workers)
         row["wrong"] += row[part].pop("wrong")
-        if not kept:
-            _say(f"  {part} took {time.perf_counter() - started:.0f} s")
+        print(f"  {part} took {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
     return row
 
 
@@ -167,30 +170,29 @@ def _run(command: list[str], setting: dict[str, str], log: Path) -> int:
                               env=clean | {"PYTHONPATH": str(ROOT)} | setting).returncode  # fmt: skip
 
 
-def run_tests(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
+def run_tests(name: str, setting: dict[str, str], folder: Path, workers: str) -> dict[str, Any]:
     """Run the numerical tests; return how many passed and which failed."""
     here, path = folder / name, folder / name / "tests.xml"
-    kept = path.is_file()
-    if not kept:
+    if not path.is_file():
         command = [sys.executable, "-m", "pytest", "-q", "-n", workers, f"--junitxml={path}.partial", *TESTS]
         status = _run(command, setting, here / "tests.log")
         if status not in (0, 1) or not Path(f"{path}.partial").is_file():  # 2 and more: not run to the end
-            return {"passed": 0, "failed": 0, "wrong": [f"not run to the end: see {here / 'tests.log'}"]}, kept
+            return {"passed": 0, "failed": 0, "wrong": [f"not run to the end: see {here / 'tests.log'}"]}
         Path(f"{path}.partial").replace(path)
     cases = list(ElementTree.parse(path).iter("testcase"))
     bad = [f"{case.get('classname')}::{case.get('name')}" for case in cases
            if case.find("failure") is not None or case.find("error") is not None]  # fmt: skip
     skipped = sum(case.find("skipped") is not None for case in cases)
     wrong = [f"test: {case}" for case in bad] if cases else ["no test ran"]
-    return {"passed": len(cases) - len(bad) - skipped, "skipped": skipped, "failed": len(bad), "wrong": wrong}, kept
+    return {"passed": len(cases) - len(bad) - skipped, "skipped": skipped, "failed": len(bad), "wrong": wrong}
 
 
-def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
+def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> dict[str, Any]:
     """Run every shipped scene in every world, and impacts; compare them with those of the default."""
     path = folder / name / "runs.json"
-    kept = path.is_file()
-    if not kept and _run([sys.executable, __file__, "--child", "runs", str(path)], setting, path.with_suffix(".log")):
-        return {"wrong": [f"runs were not computed: see {path.with_suffix('.log')}"]}, False
+    command, log = [sys.executable, __file__, "--child", "runs", str(path)], path.with_suffix(".log")
+    if not path.is_file() and _run(command, setting, log):
+        return {"wrong": [f"runs were not computed: see {log}"]}
     theirs, ours = (json.loads((folder / one / "runs.json").read_text(encoding="utf-8")) for one in ("default", name))
     found: dict[str, Any] = {"engine": 0, "engine equal": 0, "other": 0, "other equal": 0, "largest": 0.0,
                              "largest q": 0.0, "wrong": []}  # fmt: skip
@@ -205,7 +207,7 @@ def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> 
         found["largest"], found["largest q"] = max(found["largest"], largest), max(found["largest q"], q)
         if kind == "engine" or not q <= Q_TOLERANCE:
             found["wrong"].append(f"{label}: {', '.join(differ[:4])} differ; q by {q:.1e}")
-    return found, kept
+    return found
 
 
 def _differences(first: Path, second: Path) -> tuple[float, float]:
@@ -227,15 +229,14 @@ def _differences(first: Path, second: Path) -> tuple[float, float]:
     return float(q), float(largest)
 
 
-def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -> tuple[dict[str, Any], bool]:
+def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -> dict[str, Any]:
     """Run `iapb reproduce`; return its exit status and a comparison with the outcomes of the default."""
     from iapb import IapbError
     from reports.difference import CLOSE, DIFFERS, EXACT, TIMING, compare_reports
     from reports.numbers_file import read_numbers
 
     here = folder / name / "report"
-    kept = (here / "status").is_file()
-    if not kept:
+    if not (here / "status").is_file():
         command = [sys.executable, "-c", "from reports.cli import main; main()", "reproduce", "--out", str(here)]
         status = _run(command, setting, folder / name / "report.log")
         for part in ("runs", "tables"):  # half a gigabyte each time
@@ -245,7 +246,7 @@ def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -
     try:
         found = compare_reports(read_numbers(folder / "default" / "report"), read_numbers(here))
     except IapbError as missing:
-        return {"outcomes": 0, "outcomes equal": 0, "wrong": [*wrong, str(missing)]}, kept
+        return {"outcomes": 0, "outcomes equal": 0, "wrong": [*wrong, str(missing)]}
     told = [cell for cell in found.cells if cell.state != TIMING]
     outcomes = [cell for cell in told
                 if cell.column in JUDGED or isinstance(cell.old, bool) or isinstance(cell.new, bool)]  # fmt: skip
@@ -254,7 +255,7 @@ def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -
     wrong += other + [f"table in one report only: {one}" for one in found.tables_old + found.tables_new]
     return {"outcomes": len(outcomes), "outcomes equal": len(outcomes) - len(other), "numbers": len(told),
             "numbers that differ": sum(cell.state == DIFFERS for cell in told), "largest": max(gaps, default=0.0),
-            "wrong": wrong}, kept  # fmt: skip
+            "wrong": wrong}  # fmt: skip
 
 
 PARTS = {"tests": run_tests, "runs": run_runs, "report": run_report}
@@ -346,11 +347,8 @@ def table(rows: list[dict[str, Any]]) -> str:
     """Return the table of settings as text, followed by the differences found."""
     heads = ("setting", "BLAS", "tests passed/failed", "outcomes equal", "engine runs equal", "other runs equal",
              "largest difference", "of q", "result")  # fmt: skip
-    lines = [heads, *(_line(row) for row in rows)]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(heads))]
-    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
     wrong = [f"{row['setting']}: {one}" for row in rows for one in row["wrong"][:20]]
-    return "\n".join([*text, "", *wrong])
+    return "\n".join([table_text(titled(heads, map(_line, rows))), "", *wrong])
 
 
 def _line(row: dict[str, Any]) -> tuple[str, ...]:
@@ -364,10 +362,6 @@ def _line(row: dict[str, Any]) -> tuple[str, ...]:
         *(f"{runs[key]:.1e}" if key in runs else "-" for key in ("largest", "largest q")),
         "WRONG" if row["wrong"] else "the same",
     )  # fmt: skip
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,6 @@ from verification.table import HOLDS, Row, Table, by_part, ranges, table_from
 Case = TypeVar("Case")
 Result = TypeVar("Result")
 Said = str | Part | Iterable[Part]
-Wanted = tuple[Scene, str, str]  # scene, world, rendering
 
 SEED = 20050601  # of random impacts and conditions: the month in which the paper appeared
 
@@ -48,7 +47,6 @@ class Study:
     depth : "quick" or "full"; "full" has more cases
     seed : of random impacts and of fresh conditions
     asked : called whenever a check uses a run, even if an earlier check made that run
-    ahead : (scene, world, rendering) triples -> one Run each, in the same order; for a None, `run` is called later
     failures : receives the cases that raise an exception; if it is None, the exceptions propagate
     """
 
@@ -56,7 +54,6 @@ class Study:
     depth: str = "quick"
     seed: int = SEED
     asked: Callable[[Scene, str, str], None] | None = None
-    ahead: Callable[[Sequence[Wanted]], Iterable[Run | None]] | None = None
     failures: list[Failure] | None = None
     results: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
@@ -99,7 +96,7 @@ class Check:
     conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split the rows into parts,
         that count the cases of a row, that depend on measured times, and that are sentences (see `Column`)
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no fresh cases
-    prepare : (study, cases), called before the first row, for example to make runs on several cores
+    prepare : (study, cases), called before the first row, for example to compute on several cores
     rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure refutes
     place, quantity, tolerance : where the paper says it, what is measured, and the limit with its reason
     note : text printed below the table; digits : significant digits in print

@@ -88,6 +88,16 @@ def target(
     return Part(sentence, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss, quantities=quantities)
 
 
+def limited(
+    what: str, value: float, limit: float, unit: str = "", more: str = "", *, least: bool = False, timed: bool = True,
+    quantities: Quantities = (),
+) -> Part:
+    """Return a part on a value that should be at most (`least`: at least) the limit; `what` begins its sentence."""
+    told, met = f"{what} {value:.3g}{unit}", value >= limit if least else value <= limit
+    sentence = f"{told[0].upper()}{told[1:]}{more}. Target: at {'least' if least else 'most'} {limit:g}{unit}."
+    return target(sentence, met, f"{told} (target {limit:g}{unit})", timed=timed, quantities=quantities)
+
+
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:
     """Return the result of `work` and the CPU time of this thread that it took [s]."""
     started = time.thread_time()

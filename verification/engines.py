@@ -13,19 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from iapb.errors import IapbError, MissingDependencyError
 from reference.simulators import (
     FIXED_SCENES,
     SIMULATORS,
     FixedScene,
-    Simulator,
     Trajectory,
     find_simulator,
     fixed_scene,
 )
 from reference.simulators.trajectory import deepest_overlap
 from verification.check import Check, Study, Topic
-from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, attempt
+from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, attempt, check_depth
 from verification.table import Row, Table
 
 OWN, MATCHED = SETTINGS = ("own", "matched")
@@ -99,8 +98,7 @@ def compare_engines(
 
     If an engine's own settings equal the matched ones, one run gives both records.
     """
-    if depth not in ("quick", "full"):
-        raise ArgumentError("depth", depth, "quick or full")
+    check_depth(depth)
     pairs, records = list(product(engines or SIMULATORS, scenes or FIXED_SCENES)), list[EngineRecord]()
     for done, (name, scene) in enumerate(pairs, 1):
         records += attempt(f"{name} on {scene}", partial(_both, name, scene, depth), failures) or []
@@ -125,24 +123,16 @@ def _both(name: str, scene_name: str, depth: str) -> list[EngineRecord]:
         if records and settings == own:
             records.append(replace(records[0], choice=choice))
             continue
-        head = replace(blank, choice=choice, settings=str(settings), note=settings.note, step=settings.step,
-                       duration=duration)
-        records.append(replace(head, **_outcome(name, simulator, scene, settings, duration)))
+        try:
+            found = measured(scene, simulator.run(scene, settings, settings.step, duration))
+        except Exception as error:  # engines raise exceptions of any type; those of our own count as failed cases
+            if name in OUR_OWN:
+                raise
+            kind = "" if isinstance(error, IapbError) else f"{type(error).__name__}: "
+            found = {"failure": (kind + " ".join(str(error).split()))[:160]}
+        records.append(replace(blank, choice=choice, settings=str(settings), note=settings.note, step=settings.step,
+                               duration=duration, **found))
     return records
-
-
-def _outcome(name: str, simulator: Simulator, scene: Any, settings: Any, duration: float) -> dict[str, Any]:
-    """Return the measures of a run, or the failure that stopped it; engines raise exceptions of any type.
-
-    An exception of our own engines propagates, and the case counts as failed.
-    """
-    try:
-        return measured(scene, simulator.run(scene, settings, settings.step, duration))
-    except Exception as error:
-        if name in OUR_OWN:
-            raise
-        said = str(error) if isinstance(error, IapbError) else f"{type(error).__name__}: {' '.join(str(error).split())}"
-        return {"failure": said[:160]}
 
 
 def measured(scene: FixedScene, motion: Trajectory) -> dict[str, Any]:
@@ -181,41 +171,7 @@ def verdict(record: EngineRecord) -> str:
     return MET if all(abs(error or 0.0) <= CLOSE for error in errors) else MISSED
 
 
-def sentence(records: Sequence[EngineRecord]) -> str:
-    """Return the results of one engine at one choice of settings in one sentence."""
-    first = records[0]
-    if first.missing:
-        return f"{first.title} is not installed here: {first.missing}"
-    met = [record for record in records if verdict(record) == MET]
-    at = "with its own settings" if first.choice == OWN else f"with a step of {1e3 * (first.step or 0.0):g} ms"
-    parts = [f"{first.title} {first.version}, {at}, gives the known outcome in {len(met)} of {len(records)} scenes"]
-    missed = [f"{record.scene.replace('_', ' ')} ({_worst(record)})" for record in records if record not in met]
-    if missed:
-        parts.append("it misses it in " + ", ".join(missed))
-    gains = [record for record in records if (record.energy_gain or 0.0) > NEVER_RISES]
-    if gains:
-        most = max(gains, key=lambda record: record.energy_gain or 0.0)
-        parts.append(f"energy rises in {len(gains)} scene{'s' * (len(gains) > 1)}, with a relative rise of at most "
-                     f"{most.energy_gain:.2g} ({most.scene.replace('_', ' ')})")
-    else:
-        parts.append("energy rises in no scene")
-    return "; ".join(parts) + "."
-
-
-def _worst(record: EngineRecord) -> str:
-    """Return the measure with the largest error in words, or the failure."""
-    if record.failure:
-        return "failed: " + record.failure.rstrip(".")
-    if record.rests:
-        return f"moves by {record.drift:.3g} m"
-    errors = {"energy": record.energy_error, "momentum": record.momentum_error, "velocity": record.velocity_error}
-    name, value = max(errors.items(), key=lambda item: abs(item[1] or 0.0))
-    return f"{name} off by {abs(value or 0.0):.2g}"
-
-
-# The topic of the report: a record is a row, whose numbers have other names.
-_NUMBERS = {"energy error": "energy_error", "largest rise of energy": "energy_gain", "momentum error": "momentum_error",
-            "velocity error": "velocity_error"}
+# The topic of the report: a record is a row.
 
 
 def row_of(record: EngineRecord) -> Row:
@@ -223,23 +179,47 @@ def row_of(record: EngineRecord) -> Row:
     depth = None if record.penetration is None else record.penetration / fixed_scene(record.scene).length
     return {
         "engine": record.title, "version": record.version, "scene": record.scene.replace("_", " "),
-        "settings": record.choice, "law": verdict(record),
-        **{key: getattr(record, name) for key, name in _NUMBERS.items()}, "overlap / size": depth,
-        "drift [m]": record.drift, "creep [m]": record.creep, "simulated [s]": record.duration or None,
-        "failure": record.failure,
-    }
+        "settings": record.choice, "law": verdict(record), "energy error": record.energy_error,
+        "largest rise of energy": record.energy_gain, "momentum error": record.momentum_error,
+        "velocity error": record.velocity_error,
+        "overlap / size": depth, "drift [m]": record.drift, "creep [m]": record.creep,
+        "simulated [s]": record.duration or None, "failure": record.failure,
+    }  # fmt: skip
 
 
-def _record(row: Row) -> EngineRecord:
-    """Return what the sentences need of a row."""
-    numbers = {name: row[key] for key, name in _NUMBERS.items()}
-    return EngineRecord(row["engine"], row["engine"], row["version"], row["scene"], row["drift"] is not None,
-                        row["settings"], step=MATCHED_STEP, drift=row["drift"], failure=row["failure"],
-                        missing=MISSING * (row["law"] == MISSING), **numbers)
+def sentence(records: Sequence[EngineRecord]) -> str:
+    """Return the results of one engine at one choice of settings in one sentence."""
+    if records[0].missing:
+        return f"{records[0].title} is not installed here: {records[0].missing}"
+    return _sentence(ERRORS.table_of(map(row_of, records)).records())
 
 
-def _records(table: Table) -> list[EngineRecord]:
-    return [record for record in map(_record, table.records()) if not record.missing]
+def _sentence(rows: Sequence[Row]) -> str:
+    """The results of one engine at one choice of settings, from its rows."""
+    met, first = _met(rows), rows[0]
+    at = "with its own settings" if first["settings"] == OWN else f"with a step of {1e3 * MATCHED_STEP:g} ms"
+    parts = [f"{first['engine']} {first['version']}, {at}, gives the known outcome in {met} of {len(rows)} scenes"]
+    if met < len(rows):
+        missed = (f"{row['scene']} ({_worst(row)})" for row in rows if row["law"] != MET)
+        parts.append("it misses it in " + ", ".join(missed))
+    gains = [row for row in rows if (row["largest rise of energy"] or 0.0) > NEVER_RISES]
+    if gains:
+        most = max(gains, key=lambda row: row["largest rise of energy"])
+        parts.append(f"energy rises in {len(gains)} scene{'s' * (len(gains) > 1)}, with a relative rise of at most "
+                     f"{most['largest rise of energy']:.2g} ({most['scene']})")
+    else:
+        parts.append("energy rises in no scene")
+    return "; ".join(parts) + "."
+
+
+def _worst(row: Row) -> str:
+    """The measure with the largest error in words, or the failure."""
+    if row["failure"]:
+        return "failed: " + row["failure"].rstrip(".")
+    if row["drift"] is not None:
+        return f"moves by {row['drift']:.3g} m"
+    name = max(("energy", "momentum", "velocity"), key=lambda name: abs(row[f"{name} error"] or 0.0))
+    return f"{name} off by {abs(row[f'{name} error'] or 0.0):.2g}"
 
 
 def _rows(study: Study, case: tuple[str, str]) -> Iterator[Row]:
@@ -260,48 +240,41 @@ def _settings(study: Study, name: str) -> Iterator[Row]:
 
 def _says(table: Table) -> Iterator[Part]:
     """Yield one part per engine and choice of settings, and one on the engines that are not installed."""
-    present = _records(table)
-    ours = _misses(record for record in present if _is_ours(record))
-    said = False
-    for (title, choice) in dict.fromkeys((record.title, record.choice) for record in present):
-        group = [record for record in present if (record.title, record.choice) == (title, choice)]
-        met = _met(group) == len(group)
-        miss = "" if said or met or not _is_ours(group[0]) else "; ".join(
-            f"{scene} {', '.join(each)}" for scene, each in ours.items())  # one clause for both choices of settings
-        said = said or bool(miss)
-        yield Part(sentence(group), REPRODUCED if met else MIXED, miss=miss)
-    absent = sorted({row["engine"] for row in table.records() if row["law"] == MISSING})
+    present = _present(table)
+    for engine, choice in dict.fromkeys((row["engine"], row["settings"]) for row in present):
+        group = [row for row in present if (row["engine"], row["settings"]) == (engine, choice)]
+        missed = _misses(group)
+        yield Part(_sentence(group), MIXED if missed else REPRODUCED, miss=missed if _is_ours(group[0]) else "")
+    absent = sorted(set(table.where(law=MISSING).column("engine")))
     if absent:
         yield Part(f"Not installed, hence not compared: {', '.join(absent)}.", NOT_TESTABLE, optional=True)
 
 
-def _is_ours(record: EngineRecord) -> bool:
-    return record.title.endswith("(ours)")
+def _present(table: Table) -> list[Row]:
+    return [row for row in table.records() if row["law"] != MISSING]
 
 
-def _misses(records: Iterable[EngineRecord]) -> dict[str, list[str]]:
-    """Return the misses in words, by scene."""
-    missed: dict[str, list[str]] = {}
-    for one in records:
-        if verdict(one) != MET:
-            at = "at own settings" if one.choice == OWN else "at 1 ms"
-            missed.setdefault(one.scene.replace("_", " "), []).append(f"{_worst(one)} {at}")
-    return missed
+def _is_ours(row: Row) -> bool:
+    return bool(row["engine"].endswith("(ours)"))
 
 
-def _met(records: Sequence[EngineRecord]) -> int:
-    return sum(verdict(record) == MET for record in records)
+def _misses(rows: Iterable[Row]) -> str:
+    """The misses in words."""
+    return ", ".join(f"{row['scene']} {_worst(row)} {'at own settings' if row['settings'] == OWN else 'at 1 ms'}"
+                     for row in rows if row["law"] != MET)  # fmt: skip
+
+
+def _met(rows: Sequence[Row]) -> int:
+    return sum(row["law"] == MET for row in rows)
 
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
-    present = _records(tables["errors"])
-    own, matched = ([record for record in present if record.choice == choice] for choice in SETTINGS)
-    ordered = sorted(present, key=lambda record: (not _is_ours(record), record.title))
-    every = {title: _misses(group) for title, group in groupby(ordered, key=lambda record: record.title)}
-    said = "; by ".join(f"{title}: " + ", ".join(f"{scene} {' and '.join(each)}" for scene, each in missed.items())
-                        for title, missed in every.items() if missed)
+    present = sorted(_present(tables["errors"]), key=lambda row: (not _is_ours(row), row["engine"]))
+    own, matched = ([row for row in present if row["settings"] == choice] for choice in SETTINGS)
+    said = "; by ".join(f"{engine}: {missed}" for engine, rows in groupby(present, key=lambda row: row["engine"])
+                        if (missed := _misses(rows)))  # fmt: skip
     return (
-        f"{len({record.title for record in present})} engines on {len({record.scene for record in present})} scenes of "
+        f"{len({row['engine'] for row in present})} engines on {len({row['scene'] for row in present})} scenes of "
         f"known outcome: the outcome is right in {_met(own)} of {len(own)} runs with the engine's own settings and in "
         f"{_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Missed by {said}." if said else "")
     )

@@ -138,13 +138,8 @@ def check_quantities(quantities: Quantities, sentence: str) -> None:
     for name, value in quantities:
         if name not in QUANTITIES:
             raise ArgumentError("quantity", name, one_of(name, QUANTITIES))
-        if not said_as(value).search(sentence):
+        if not re.search(rf"(?<![\w.,]){re.escape(value)}(?!\w|[.,]\d)", sentence):  # no piece of a longer number
             raise ArgumentError(f"value of the quantity {name!r}", value, f"a number that is part of: {sentence}")
-
-
-def said_as(value: str) -> re.Pattern[str]:
-    """Return a pattern that matches the value in a sentence, but not as a piece of a longer number."""
-    return re.compile(rf"(?<![\w.,]){re.escape(value)}(?!\w|[.,]\d)")
 
 
 def check_depth(depth: str) -> None:

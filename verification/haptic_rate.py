@@ -30,12 +30,6 @@ def _rates(trials: Table) -> Iterator[Row]:
         yield {"coordinates": d} | {name: most.get(title, {}).get(d, 0) for title, name in _MOST.items()}
 
 
-def _rate_says(table: Table) -> Part:
-    texts = [f"{ours} at d = {d} ({printed} by the printed formula)" for d, ours, printed in table.rows]
-    return target("Largest number of contacts at which 99.9 % of the impacts take less than a millisecond (claim C19): "
-                  f"{', '.join(texts)}.", True)
-
-
 def _kernels_say(table: Table) -> Part:
     """Say where Lemke's method is faster than IAPB by the times of claim C22, which the figure of them shows."""
     slower, count = table.that(False), len(table.decided)
@@ -59,7 +53,7 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:
 _MOST = {title: f"most contacts, {title.removeprefix('the ')}" for title in TITLES.values()}
 RATE = Check(
     key="contacts at 1 kHz", question="How many contacts does a millisecond allow?", row=lambda _, row: row, digits=6,
-    cases=lambda study: list(_rates(study.table(C19))), says=_rate_says, timed=tuple(_MOST.values()),
+    cases=lambda study: list(_rates(study.table(C19))), timed=tuple(_MOST.values()),
     note="Largest size tried of which 999 of 1000 impacts end within 1 ms, on this machine.",
 )  # fmt: skip
 KERNELS = replace(C22, key="compiled, IAPB and Lemke", says=_kernels_say)

@@ -86,11 +86,11 @@ class ImpactCase:
 
     def given(self) -> tuple[Any, ...]:
         """Copies of the arguments for a resolver: M, J, v and e; with friction M, J, T, v, e and μ."""
+        M, J, v = (array.copy() for array in self.arrays)
         e = self.given_restitution()
         if self.tangents is None or self.friction is None:
-            return self.mass_matrix.copy(), self.contact_jacobian.copy(), self.velocity.copy(), e
-        return (self.mass_matrix.copy(), self.contact_jacobian.copy(), self.tangents.copy(), self.velocity.copy(), e,
-                self.friction.copy())
+            return M, J, v, e
+        return M, J, self.tangents.copy(), v, e, self.friction.copy()
 
     @cached_property
     def condition(self) -> float:
@@ -190,13 +190,10 @@ SCALE_POWERS = 27
 
 def draw_wide_case(rng: np.random.Generator, number: int, largest_condition: float = 1e8) -> ImpactCase:
     """Return impact `number` of a series. One in ten is large, half use other units, some are at rest or partly so."""
-    contacts, size = None, None
-    if number % LARGE_EVERY == LARGE_EVERY // 2:
-        kind = LARGE_KINDS[number // LARGE_EVERY % len(LARGE_KINDS)]
-        if "contacts" in kind:
-            contacts = int(rng.integers(LARGE_CONTACTS[0], LARGE_CONTACTS[1] + 1))
-        if "coordinates" in kind:
-            size = int(rng.integers(LARGE_COORDINATES[0], LARGE_COORDINATES[1] + 1))
+    large = number % LARGE_EVERY == LARGE_EVERY // 2
+    kind = LARGE_KINDS[number // LARGE_EVERY % len(LARGE_KINDS)] if large else ""
+    contacts = int(rng.integers(*LARGE_CONTACTS, endpoint=True)) if "contacts" in kind else None
+    size = int(rng.integers(*LARGE_COORDINATES, endpoint=True)) if "coordinates" in kind else None
     case = draw_case(rng, largest_condition, coordinates=size, contacts=contacts)
     name, v = case.family, case.velocity
     chance = rng.random()
@@ -434,9 +431,9 @@ class Family(NamedTuple):
 def draw_of_rank(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
     """Yield `count` impacts; the same seed gives the same ones."""
     rng = np.random.default_rng([seed, *(round(number) for number in family)])
+    half = 0.5 * np.log10(family.condition_number)
+    spectrum = 10.0 ** np.linspace(-half, half, family.coordinates) if family.coordinates > 1 else np.ones(1)
     for _ in range(count):
-        half = 0.5 * np.log10(family.condition_number)
-        spectrum = 10.0 ** np.linspace(-half, half, family.coordinates) if family.coordinates > 1 else np.ones(1)
         mass = with_spectrum(rng, spectrum)
         velocity = rng.standard_normal(family.coordinates)
         yield ImpactCase(mass, _rows_of_rank(rng, family), velocity, rank=family.rank)

@@ -37,10 +37,10 @@ def gram_cholesky(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Return v⁺ by (W + λI)⁻¹, λ = 1e-8 of W's largest diagonal entry: every mode keeps part of its approach."""
+    """Return v⁺ by (W + λI)⁻¹, λ = 1e-10 of W's largest diagonal entry: each mode keeps part of its approach."""
     push = np.linalg.solve(M, J.T)
     W = J @ push
-    share = 1e-8 * max(np.diag(W).max(initial=0.0), np.finfo(float).tiny)
+    share = 1e-10 * max(np.diag(W).max(initial=0.0), np.finfo(float).tiny)
     return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(W + share * np.eye(len(W)), J @ v)))
 
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,66 +100,59 @@ def search_region(trials: Table) -> Region | None:
     order of the columns. It adds a second condition only if the region then keeps at least 1.5 times as many trials,
     because the simpler region generalizes better.
     """
-    scales = [_intervals(column, trials) for column in trials.columns if column.condition]
-    scales = [scale for scale in scales if len(scale) > 1]
-    alone = max((_best(trials, scale, [_Interval()]) for scale in scales), key=_kept_simply, default=(0, ()))
-    pairs = (_best(trials, first, second) for first, second in combinations(scales, 2))
-    together = max(pairs, key=_kept_simply, default=(0, ()))
-    kept, chosen = together if 2 * together[0] >= 3 * alone[0] else alone
+    scales = [scale for column in trials.columns if column.condition and (scale := _intervals(column, trials))]
+    everything = [_Interval("", "", None, None, 1.0, np.ones(len(trials.rows), np.bool_))]
+    alone, together = (
+        max((_best(trials, *pair) for pair in pairs), default=(0, 0, ()), key=lambda found: found[:2])
+        for pairs in (((scale, everything) for scale in scales), combinations(scales, 2)))  # fmt: skip
+    kept, _, chosen = together if 2 * together[0] >= 3 * alone[0] else alone
     if not kept or not chosen:
         return None
     share = math.prod(interval.share for interval in chosen)
     return Region(tuple((x.key, x.unit, x.low, x.high) for x in chosen), kept, share=share)
 
 
-@dataclass(frozen=True)
-class _Interval:
+class _Interval(NamedTuple):
     """Values of one condition between `low` and `high`; None means no bound on that side."""
 
-    key: str = ""
-    unit: str = ""
-    low: float | None = None
-    high: float | None = None
-    share: float = 1.0
+    key: str
+    unit: str
+    low: float | None
+    high: float | None
+    share: float
+    inside: np.ndarray  # whether each trial lies in it
 
     @property
     def ends(self) -> int:
         return (self.low is not None) + (self.high is not None)
 
-    def inside(self, trials: Table) -> np.ndarray:
-        values = np.array(trials.column(self.key) if self.key else [0.0] * len(trials.rows), float)
-        low, high = -np.inf if self.low is None else self.low, np.inf if self.high is None else self.high
-        return (values >= low) & (values <= high)
 
-
-def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, tuple[_Interval, ...]]:
-    """Number of trials that the best pair of intervals keeps without a failure, and those of the two with a bound."""
+def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, int, tuple[_Interval, ...]]:
+    """Number of trials that the best pair of intervals keeps without a failure, minus the number of its bounds, and
+    those of the two with a bound."""
     held, failed = (np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False))
-    inside, other = (np.array([interval.inside(trials) for interval in scale]) for scale in (first, second))
+    inside, other = (np.array([interval.inside for interval in scale]) for scale in (first, second))
     kept, wrong = ((inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed))
     ends = np.add.outer([interval.ends for interval in first], [interval.ends for interval in second])
     score = np.where(wrong == 0, _MOST_ENDS * kept - ends, -_MOST_ENDS)
     i, j = np.unravel_index(int(score.argmax()), score.shape)
     found = int(kept[i, j]) if wrong[i, j] == 0 else 0
-    return found, tuple(interval for interval in (first[i], second[j]) if interval.ends)
-
-
-def _kept_simply(found: tuple[int, tuple[_Interval, ...]]) -> tuple[int, int]:
-    return found[0], -sum(interval.ends for interval in found[1])
+    return found, -int(ends[i, j]), tuple(interval for interval in (first[i], second[j]) if interval.ends)
 
 
 def _intervals(column: Column, trials: Table) -> list[_Interval]:
-    """All intervals between two values of a condition, including the unbounded one; empty if a value is no number."""
+    """All intervals between two values of a condition, including the unbounded one; empty if a value is no number, or
+    if there is only one value."""
     values = trials.column(column.key)
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return []
-    seen = sorted(set(values))
+    seen, places = sorted(set(values)), np.array(values, float)
     if len(seen) < 2:
         return []
     scale = math.log10 if seen[0] > 0 and seen[-1] / seen[0] >= _DECADES else float
     length = scale(seen[-1]) - scale(seen[0])
     return [
         _Interval(column.key, column.unit, low if i else None, high if j < len(seen) - 1 else None,
-                  (scale(high) - scale(low)) / length)
+                  (scale(high) - scale(low)) / length, (places >= low) & (places <= high))
         for i, low in enumerate(seen) for j, high in enumerate(seen) if i < j
     ]  # fmt: skip

@@ -62,6 +62,8 @@ class Table:
         index = self.keys.index(key)
         return [row[index] for row in self.rows]
 
+    __getitem__ = column
+
     def records(self) -> list[dict[str, Any]]:
         """Return the rows as dictionaries by key."""
         return [dict(zip(self.keys, row, strict=True)) for row in self.rows]
@@ -135,12 +137,6 @@ class Table:
     def prose(self) -> tuple[str, ...]:
         """Titles of the columns of sentences."""
         return tuple(column.title for column in self.columns if column.prose)
-
-
-def table_of(columns: Sequence[Column], records: Iterable[Row], **options: Any) -> Table:
-    """Return a table of these columns from dictionaries; missing keys become None."""
-    rows = tuple(tuple(record.get(column.key) for column in columns) for record in records)
-    return Table(tuple(columns), rows, **options)
 
 
 def titled(

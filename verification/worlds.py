@@ -17,12 +17,11 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.advice.effects import ignored_fields
 from iapb.errors import ArgumentError, IapbError
@@ -32,6 +31,7 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import INTERRUPTED
+from reference import Floats
 from reference.complementarity.solvers import SOLVERS
 from reference.datasets import StoredProblem
 from reference.worlds import WORLDS, run_world
@@ -39,10 +39,11 @@ from verification.complementarity.agreement import compare_cases
 from verification.complementarity.of_runs import impacts_of_run, problems_of_run
 from verification.complementarity.solvers import VERDICTS, ProblemStudy, study_read
 from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Finding, Part, attempt, finding_of
-from verification.table import Table, titled
+from verification.table import Row, Table, table_from
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
+Ran = tuple[Run, float]  # a run, and the processor time per step [s] without set-up
+Series = dict[str, Floats]  # quantities over time, by their column
 
 INSTANTS = 1000  # largest number of instants at which worlds are compared
 QUESTION = (
@@ -51,14 +52,6 @@ QUESTION = (
     "The impacts of IAPB are then given to every complementarity solver."
 )
 _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the three distances
-
-
-@dataclass(frozen=True)
-class WorldRun:
-    """A run in one world, and the CPU time per step [s] without setup; NaN if the run was too short."""
-
-    run: Run
-    seconds: float
 
 
 def default_worlds(scene: Scene) -> tuple[str, ...]:
@@ -109,15 +102,26 @@ def compare_worlds(
     mechanism = mechanism_of(scene)
     impulse = ("resultant of all contacts" if mechanism.has_constant_mass_matrix
                else "generalized, no resultant: M(q) varies")
-    unfit = {name: why for name, found in runs.items() if (why := _unfit(scene, found.run))}
-    series = {name: _series(mechanism, found.run, runs[against].run) for name, found in runs.items()}
-    tables = {"worlds": _worlds_table(runs, series, against, impulse), "over time": _series_table(series)}
-    parts = [_part_of_runs(scene, runs, unfit)]
+    unfit = {name: why for name, (run, _) in runs.items() if (why := _unfit(scene, run))}
+    series = {name: _series(mechanism, run, runs[against][0]) for name, (run, _) in runs.items()}
+    fastest = min(seconds for _, seconds in runs.values())
+    tables = {
+        "worlds": table_from(
+            [_world(name, ran, None if name == against else series[name], fastest) for name, ran in runs.items()], 3,
+            f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. "
+            f"Impulse: {impulse}. Lost: start and work done, minus the end. The time is the processor's, without "
+            "set-up.", timed=("time per step", "times the fastest")),
+        "over time": table_from({"world": name, **dict(zip(found, map(float, row), strict=True))}
+                                for name, found in series.items() for row in zip(*found.values(), strict=True)),
+    }  # fmt: skip
+    fit = len(runs) - len(unfit)
+    said = f"{fit} of {len(runs)} worlds ran to the end of {scene.duration:g} s and are to be trusted"
+    said += "".join(f"; {name} {why}" for name, why in unfit.items())
+    parts = [Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))]
     if impacts:
-        struck = runs["IAPB"].run if "IAPB" in runs else run_world(scene, "IAPB", partial=True)
+        struck = runs["IAPB"][0] if "IAPB" in runs else run_world(scene, "IAPB", partial=True)
         judged = attempt("impacts", partial(compare_impacts, struck, scene, impacts, say, failures), failures)
-        tables |= judged[1] if judged else {}
-        parts += judged[0] if judged else []
+        parts, tables = (parts + judged[0], tables | judged[1]) if judged else (parts, tables)
     finding = finding_of(f"worlds of {scene.name}", scene.title or scene.name, QUESTION,
                          _answer(runs, series, against, unfit), parts, tables, failures)
     return replace(finding, details={"scene": scene.name, "worlds": ", ".join(runs), "against": against,
@@ -138,7 +142,7 @@ def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> 
     return (*names, *([against] if against not in names else [])), against
 
 
-def _run(scene: Scene, world: str, say: Progress) -> WorldRun:
+def _run(scene: Scene, world: str, say: Progress) -> Ran:
     """Simulate the scene; the clock is read at the end of each chunk, which excludes the setup of the first chunk."""
     clock: list[tuple[int, float]] = []
 
@@ -151,11 +155,11 @@ def _run(scene: Scene, world: str, say: Progress) -> WorldRun:
     if run.stopped == INTERRUPTED:
         raise KeyboardInterrupt
     if len(clock) > 1:
-        return WorldRun(run, (clock[-1][1] - clock[0][1]) / (clock[-1][0] - clock[0][0]))
-    return WorldRun(run, float(run.chunk_seconds.sum()) / run.steps)  # one chunk: wall-clock time
+        return run, (clock[-1][1] - clock[0][1]) / (clock[-1][0] - clock[0][0])
+    return run, float(run.chunk_seconds.sum()) / run.steps  # one chunk: wall-clock time
 
 
-def _series(mechanism: Mechanism, run: Run, reference: Run) -> dict[str, Floats]:
+def _series(mechanism: Mechanism, run: Run, reference: Run) -> Series:
     """Return all compared quantities over time, at the instants that both runs have."""
     at = np.unique(np.linspace(0, reference.steps, min(reference.steps, INSTANTS) + 1).round().astype(np.int64))
     at = at[at <= run.steps]
@@ -164,19 +168,16 @@ def _series(mechanism: Mechanism, run: Run, reference: Run) -> dict[str, Floats]
     moved = np.array([mechanism.difference(*pair) for pair in zip(q, run.q[at], strict=True)])
     given = _given(run)[at] - _given(reference)[at]
     answer = np.linalg.solve(mass, given[:, :, None])[:, :, 0]
-    forms = {"configuration": _form(mass, moved) / whole, "velocity": _form(mass, run.v[at] - v) / whole,
+    forms = {"configuration": np.einsum("ki,kij,kj->k", moved, mass, moved) / whole,
+             "velocity": np.einsum("ki,kij,kj->k", run.v[at] - v, mass, run.v[at] - v) / whole,
              "impulse": np.einsum("ki,ki->k", given, answer) * whole}
     depth, steps = np.zeros(run.steps + 1), np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
     np.maximum.at(depth, steps + 1, -run.contacts.gap)
     since = np.minimum(np.concatenate([[0], at[:-1] + 1]), run.steps)  # the deepest since the previous instant
-    return {"time": run.time[at], **{name: np.sqrt(np.maximum(form, 0.0)) for name, form in forms.items()},
-            "energy": run.energy["kinetic"][at] + run.energy["potential"][at],
-            "penetration": np.maximum.reduceat(depth, since)}
-
-
-def _form(matrices: Floats, vectors: Floats) -> Floats:
-    """xᵀ M x of n matrices and n vectors."""
-    return np.asarray(np.einsum("ki,kij,kj->k", vectors, matrices, vectors), np.float64)
+    return {"time [s]": run.time[at],
+            **{f"{name} [{_UNITS[name]}]": np.sqrt(np.maximum(form, 0.0)) for name, form in forms.items()},
+            "energy [J]": run.energy["kinetic"][at] + run.energy["potential"][at],
+            "penetration [m]": np.maximum.reduceat(depth, since)}
 
 
 def _given(run: Run) -> Floats:
@@ -184,47 +185,29 @@ def _given(run: Run) -> Floats:
     return np.vstack([np.zeros(run.v.shape[1]), np.cumsum(run.environment_force, axis=0) * run.dt])
 
 
-def _worlds_table(
-    runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str, impulse: str
-) -> Table:
-    fastest = min(found.seconds for found in runs.values())
-    rows = []
-    for name, found in runs.items():
-        run, apart = found.run, series[name]
-        far = [value for key in _UNITS for value in _sizes(apart[key])] if name != against else [None] * 9
-        rows.append((name, run.law, ", ".join(ignored_fields(run.effects)) or None, float(run.time[-1]), *far,
-                     *_energies(run), 1e3 * float(max(0.0, -run.contacts.gap.min(initial=0.0))), len(run.impacts.step),
-                     1e6 * found.seconds, found.seconds / fastest))
-    far_titles = [f"{name}, {which} [{_UNITS[name]}]" for name in _UNITS for which in ("rms", "most", "end")]
-    return titled(
-        ("world", "law", "ignores", "simulated until [s]", *far_titles, "kinetic energy at the end [J]",
-         "work done [J]", "energy lost [J]", "most above start and work [J]", "deepest overlap [mm]", "impacts",
-         "time per step [µs]", "times the fastest"), rows, 3,
-        f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. Impulse: "
-        f"{impulse}. Lost: start and work done, minus the end. The time is the processor's, without set-up.",
-        timed=("time per step [µs]", "times the fastest"))
+def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
+    """Return the row of a world; `apart` has its distances, None for the reference world."""
+    run, seconds = ran
+    far = {f"{key}, {which} [{unit}]": None if apart is None else _sizes(apart[f"{key} [{unit}]"])[which]
+           for key, unit in _UNITS.items() for which in ("rms", "most", "end")}
+    books: dict[str, float | None] = dict.fromkeys(
+        ("work done [J]", "energy lost [J]", "most above start and work [J]"))
+    if run.coupling != "unilateral":  # that coupler moves the tool at times, so there is no energy balance
+        work = np.concatenate([[0.0], run.energy["hand_work"] + run.energy["coupling_work"]])
+        total = run.energy["kinetic"] + run.energy["potential"]
+        above = total - total[0] - work
+        books = dict(zip(books, (float(work[-1]), 0.0 - float(above[-1]), float(above.max())), strict=True))
+    return {"world": name, "law": run.law, "ignores": ", ".join(ignored_fields(run.effects)) or None,
+            "simulated until [s]": float(run.time[-1]), **far,
+            "kinetic energy at the end [J]": float(run.energy["kinetic"][-1]), **books,
+            "deepest overlap [mm]": 1e3 * float(max(0.0, -run.contacts.gap.min(initial=0.0))),
+            "impacts": len(run.impacts.step), "time per step [µs]": 1e6 * seconds,
+            "times the fastest": seconds / fastest}
 
 
-def _sizes(values: Floats) -> tuple[float, float, float]:
+def _sizes(values: Floats) -> dict[str, float]:
     """Root mean square, largest and last value."""
-    return float(np.sqrt(np.mean(values**2))), float(values.max()), float(values[-1])
-
-
-def _energies(run: Run) -> tuple[float | None, ...]:
-    """Return final kinetic energy, work done, energy lost, and the largest excess of energy over start plus work."""
-    total = run.energy["kinetic"] + run.energy["potential"]
-    if run.coupling == "unilateral":  # there is no energy balance of the tool, which the coupler moves at times
-        return float(run.energy["kinetic"][-1]), None, None, None
-    work = np.concatenate([[0.0], run.energy["hand_work"] + run.energy["coupling_work"]])
-    above = total - total[0] - work
-    return float(run.energy["kinetic"][-1]), float(work[-1]), 0.0 - float(above[-1]), float(above.max())
-
-
-def _series_table(series: dict[str, dict[str, Floats]]) -> Table:
-    units = {"time": "s", **_UNITS, "energy": "J", "penetration": "m"}
-    rows = [(name, *map(float, row)) for name, found in series.items()
-            for row in zip(*(found[key] for key in units), strict=True)]
-    return titled(("world", *(f"{key} [{unit}]" for key, unit in units.items())), rows)
+    return {"rms": float(np.sqrt(np.mean(values**2))), "most": float(values.max()), "end": float(values[-1])}
 
 
 def _unfit(scene: Scene, run: Run) -> str:
@@ -234,33 +217,22 @@ def _unfit(scene: Scene, run: Run) -> str:
     return f"not to be trusted: {'; '.join(run.distrust)}" if run.distrust else ""
 
 
-def _part_of_runs(scene: Scene, runs: dict[str, WorldRun], unfit: dict[str, str]) -> Part:
-    """Return the part on whether every world's run is complete and trustworthy."""
-    fit = len(runs) - len(unfit)
-    said = f"{fit} of {len(runs)} worlds ran to the end of {scene.duration:g} s and are to be trusted"
-    said += "".join(f"; {name} {why}" for name, why in unfit.items())
-    return Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))
-
-
-def _answer(
-    runs: dict[str, WorldRun], series: dict[str, dict[str, Floats]], against: str, unfit: dict[str, str]
-) -> str:
-    """Return the answer: the closest world to the reference and its distance, among the worlds fit for the comparison.
-    """
+def _answer(runs: dict[str, Ran], series: dict[str, Series], against: str, unfit: dict[str, str]) -> str:
+    """Return which world is closest to the reference, and how close, among the worlds fit for the comparison."""
     if len(series) == 1:
         return f"Only {against} was simulated."
     if against in unfit:
         return f"No world is called closest: the reference {against} {unfit[against]}."
-    others = {name: found for name, found in series.items() if name != against and name not in unfit}
+    far = {name: _sizes(found["configuration [m]"]) for name, found in series.items()
+           if name != against and name not in unfit}
     left_out = f" Not ranked: {'; '.join(f'{name} {why}' for name, why in unfit.items())}." if unfit else ""
-    if not others:
+    if not far:
         return f"No world can be compared with {against}.{left_out}"
-    closest = min(others, key=lambda name: _sizes(others[name]["configuration"])[0])
-    rms, most, _ = _sizes(others[closest]["configuration"])
-    ratio = runs[against].seconds / runs[closest].seconds
+    closest = min(far, key=lambda name: far[name]["rms"])
+    ratio = runs[against][1] / runs[closest][1]
     speed = f"{ratio:.3g} times as fast" if ratio >= 1.0 else f"{1.0 / ratio:.3g} times as slow"
-    return (f"Closest to {against} is {closest}: {1e3 * rms:.3g} mm apart (rms over mass and time), "
-            f"{1e3 * most:.3g} mm at most; its step is {speed}.{left_out}")
+    return (f"Closest to {against} is {closest}: {1e3 * far[closest]['rms']:.3g} mm apart (rms over mass and time), "
+            f"{1e3 * far[closest]['most']:.3g} mm at most; its step is {speed}.{left_out}")
 
 
 # The impacts of IAPB as complementarity problems, with and without friction, for every solver.
@@ -279,59 +251,52 @@ def compare_impacts(
         return [Part(said, NOT_TESTABLE, "impacts", optional=True)], {}
     stored = [StoredProblem(problem, format="built here") for problem in problems]
     study = study_read(f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures)
-    return [_motion(run, scene, failures), _solved(study)], {"solvers": _solvers(study), "problems": _problems(study)}
-
-
-def _motion(run: Run, scene: Scene, failures: list[Failure]) -> Part:
-    """Return the part on whether IAPB's impacts equal those of the Newton LCP, as they do if all contacts push."""
+    # IAPB's impacts equal those of the Newton LCP if all contacts push
     compared = compare_cases(impacts_of_run(run, scene).cases[:CASES], failures=failures)
-    agree, push = sum(one.agrees for one in compared), sum(one.pushes for one in compared)
-    sentence = (f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
-                f"{len(compared) - push} an impulse pulls. The largest distance is "
-                f"{max(one.distance for one in compared):.2g} of |v⁻|.")
-    return Part(sentence, REPRODUCED if agree == len(compared) else MIXED, "motion", agree, len(compared))
+    agree, push = (sum(one[key] for one in compared) for key in ("agrees", "pushes"))
+    moves = (f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
+             f"{len(compared) - push} an impulse pulls. The largest distance is "
+             f"{max(one['distance'] for one in compared):.2g} of |v⁻|.")
+    verdict = REPRODUCED if agree == len(compared) else MIXED
+    return [Part(moves, verdict, "motion", agree, len(compared)), _solved(study)], {
+        "solvers": table_from(
+            [_solver(study, name) for name in study.solvers], 3,
+            "Residuals are recomputed from the problem, relative to its velocities; solved: at most 1e-6.",
+            timed=("median time", "left out")),
+        "problems": table_from(_problems(study), 3, timed=("time", "note")),
+    }  # fmt: skip
 
 
 def _solved(study: ProblemStudy) -> Part:
     """Return the part on correct answers and on solvers with wrong ones; a refusal or an error is no answer."""
-    solved = [row for row in study.rows if row.verdict == "solved"]
+    solved = sum(row.verdict == "solved" for row in study.rows)
     wrong = Counter(row.solver for row in study.rows if row.verdict == "failed" and np.isfinite(row.residuals.worst))
-    answers = len(solved) + wrong.total()
-    unsolved = [line["problem"] for line in study.lines if "solved" not in line.values()]
-    sentence = (f"{len(solved)} of {answers} answers are solutions, by residuals recomputed from the problem; "
-                f"{len(study.lines) - len(unsolved)} of {len(study.lines)} problems have one.")
+    answers, unsolved = solved + wrong.total(), sum("solved" not in line.values() for line in study.lines)
+    sentence = (f"{solved} of {answers} answers are solutions, by residuals recomputed from the problem; "
+                f"{len(study.lines) - unsolved} of {len(study.lines)} problems have one.")
     if wrong:
         sentence += f" Wrong answers: {', '.join(f'{solver} {count}' for solver, count in wrong.items())}."
-    verdict = MIXED if unsolved or wrong else REPRODUCED
-    return Part(sentence, verdict, "solvers", len(solved), answers, timed=True)
+    return Part(sentence, MIXED if unsolved or wrong else REPRODUCED, "solvers", solved, answers, timed=True)
 
 
-def _solvers(study: ProblemStudy) -> Table:
-    """Return a table with one row per solver."""
-    rows = []
-    for solver in study.solvers:
-        mine = [row for row in study.rows if row.solver == solver]
-        solved = [row for row in mine if row.verdict == "solved"]
-        counts = [sum(row.verdict == verdict for row in mine) for verdict in VERDICTS[1:]]
-        rows.append((solver, "friction" if SOLVERS[solver].takes == "cone" else "none", len(mine), len(solved), *counts,
-                     max((row.residuals.worst for row in solved), default=None),
-                     max((row.spread for row in solved), default=None),
-                     float(np.median([1e6 * row.seconds for row in solved])) if solved else None))
-    return titled(("solver", "friction", "problems", *VERDICTS, "worst residual", "spread of velocities",
-                   "median time [µs]"), rows, 3,
-                  "Residuals are recomputed from the problem, relative to its velocities; solved: at most 1e-6.",
-                  timed=("median time [µs]", "left out"))
+def _solver(study: ProblemStudy, name: str) -> Row:
+    mine = [row for row in study.rows if row.solver == name]
+    solved = [row for row in mine if row.verdict == "solved"]
+    return {"solver": name, "friction": "friction" if SOLVERS[name].takes == "cone" else "none", "problems": len(mine),
+            **{verdict: sum(row.verdict == verdict for row in mine) for verdict in VERDICTS},
+            "worst residual": max((row.residuals.worst for row in solved), default=None),
+            "spread of velocities": max((row.spread for row in solved), default=None),
+            "median time [µs]": float(np.median([1e6 * row.seconds for row in solved])) if solved else None}
 
 
-def _problems(study: ProblemStudy) -> Table:
-    """Return a table with one row per solver and problem."""
+def _problems(study: ProblemStudy) -> list[Row]:
+    """Return a row per solver and problem."""
     size = {line["problem"]: line for line in study.lines}
-    rows = [(row.problem, size[row.problem]["unknowns"], size[row.problem]["rank"], row.solver, row.verdict,
-             _known(row.residuals.worst), _known(row.spread), _known(1e6 * row.seconds), row.note)
+
+    def known(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return [{"problem": row.problem, "unknowns": size[row.problem]["unknowns"], "rank": size[row.problem]["rank"],
+             "solver": row.solver, "outcome": row.verdict, "worst residual": known(row.residuals.worst),
+             "spread of velocities": known(row.spread), "time [µs]": known(1e6 * row.seconds), "note": row.note}
             for row in study.rows]
-    return titled(("problem", "unknowns", "rank", "solver", "outcome", "worst residual", "spread of velocities",
-                   "time [µs]", "note"), rows, 3, timed=("time [µs]", "note"))
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -43,6 +43,8 @@ class Shapes(NamedTuple):
     axes: Floats  # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
     half_size: Floats  # (n, 3) [m] of a box, along its axes
     space: Any  # whether they are shapes in space (`iapb.compiled.flag`)
+    polygons: Any  # whether one of them is a polygon
+    balls: Any  # whether two of them are circles or spheres
 
 
 class ContactBuffer(NamedTuple):
@@ -88,7 +90,8 @@ def make_shapes(given: Sequence[Shape], space: bool) -> Shapes:
         np.array(kind, np.int32), np.array(body, np.int32), np.array(radius, float),
         (np.cumsum(count) - count).astype(np.int32), count, np.concatenate([np.zeros((0, 2)), *vertices]),
         np.array(center, float).reshape(n, 3), np.array(axes, float).reshape(n, 3, 3),
-        np.array(half_size, float).reshape(n, 3), flag(space))
+        np.array(half_size, float).reshape(n, 3), flag(space), flag(POLYGON in kind),
+        flag(sum(one in (CIRCLE, SPHERE) for one in kind) > 1))
 
 
 def candidate_pairs(shapes: Shapes) -> Indices:

@@ -25,6 +25,7 @@ class Port(NamedTuple):
 
     coupling: int  # NO_COUPLING, FOUR_CHANNEL, UNILATERAL
     device: Any  # whether there is one (`iapb.compiled.flag`)
+    hand: Any  # whether there is one
     tool_tree: int  # -1: no tool is held
     q_start: int  # the tool's range in q
     q_stop: int
@@ -123,7 +124,7 @@ def sense(world, port, velocity):
 # The forces on the tool in one step: the hand's and the position channels' (paper VI).
 
 
-@kernel
+@kernel(needs="hand")
 def couple(world, state, port):
     """Write the forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD."""
     if port.tool_tree < 0:

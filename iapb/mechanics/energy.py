@@ -19,12 +19,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from iapb.compiled import Entry
 from iapb.errors import ArgumentError
-from iapb.mechanics.mechanism import Mechanism, entries
+from iapb.mechanics.kernels.evaluation import impact_loss
+from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 from iapb.schema import Floats
 
 FORCES = ("hand", "coupling", "penalty", "friction")
+_impact_loss = Entry(impact_loss)
 
 
 def port_energy(force: Floats, displacement: Floats, before: float = -0.0) -> Floats:
@@ -49,7 +52,7 @@ def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -
     losses, change, lower = np.zeros(len(impulse)), np.zeros(mechanism.nv), np.zeros((mechanism.nv, mechanism.nv))
     for k in np.flatnonzero(impulse.any(axis=1)):
         mass_matrix = mechanism.mass_matrix(q[0 if mechanism.has_constant_mass_matrix else k])
-        losses[k] = entries.impact_loss(mass_matrix, lower, v[k], impulse[k], change)
+        losses[k] = _impact_loss(mass_matrix, lower, v[k], impulse[k], change)
     return losses
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,12 +27,14 @@ from iapb.schema import Floats, Integers
 
 __all__ = ["Body", "Joint", "Mechanism"]
 
-# The kernels that Python calls, always with a mechanism's blocks and contiguous float arrays (see `Entry`).
-entries = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
-    configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
-    evaluation.all_finite, evaluation.biases_at, evaluation.centroidal_momentum, evaluation.displacements_along,
-    evaluation.energies_along, evaluation.impact_loss, evaluation.mass_matrices_at, evaluation.misplaced_body,
-    evaluation.poses_along, evaluation.rows_along, kinematics.forward_kinematics, kinematics.frame_jacobian)})
+@cache
+def _entries_for(kind: Any) -> SimpleNamespace:
+    """Return the kernels that Python calls with mechanisms of this type of block (see `Entry`)."""
+    return SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
+        configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
+        evaluation.all_finite, evaluation.biases_at, evaluation.centroidal_momentum, evaluation.displacements_along,
+        evaluation.energies_along, evaluation.mass_matrices_at, evaluation.misplaced_body, evaluation.poses_along,
+        evaluation.rows_along, kinematics.forward_kinematics, kinematics.frame_jacobian)})
 
 
 class _Scratch(threading.local):
@@ -87,6 +90,7 @@ class Mechanism:
         self.nq, self.nv = len(self.coordinate_names), len(self.velocity_names)
         self.arrays: MechanismArrays = structure.collect_arrays(self.bodies, parents)
         self.block: Any = block(self.arrays)
+        self._entries = _entries_for(self.block.block_type)
         self.tree_of_body: Integers = np.array(trees, np.int64)
         starts = self.arrays.v_start[np.flatnonzero(np.diff(self.tree_of_body, prepend=-1))].tolist()
         self.tree_dofs: list[tuple[int, int]] = list(zip(starts, [*starts[1:], self.nv], strict=False))
@@ -126,11 +130,11 @@ class Mechanism:
 
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector coordinates."""
-        return self._filled((self.nq,), entries.integrate, self._place(q), self._rates(v), float(dt))
+        return self._filled((self.nq,), self._entries.integrate, self._place(q), self._rates(v), float(dt))
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest rotations."""
-        return self._filled((self.nv,), entries.difference, self._place(q0, "q0"), self._place(q1, "q1"))
+        return self._filled((self.nv,), self._entries.difference, self._place(q0, "q0"), self._place(q1, "q1"))
 
     def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """Return (R (n, 3, 3), p (n, 3) [m]): axes and origin of every body in the world."""
@@ -145,12 +149,12 @@ class Mechanism:
         """
         places = float_array("qs", qs, (-1, self.nq))
         shape = len(places), len(self.bodies), 3 if planar else 7
-        return self._filled(shape, entries.poses_along, self._scratch.workspace, places)
+        return self._filled(shape, self._entries.poses_along, self._scratch.workspace, places)
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
         place, out = float_array("q", q, (self.nq,)), np.empty((self.nv, self.nv))
-        if not entries.mass_matrices_at(self._scratch.parts, place, out):
+        if not self._entries.mass_matrices_at(self._scratch.parts, place, out):
             self._place(place)
         return out
 
@@ -158,7 +162,7 @@ class Mechanism:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
         places = float_array("qs", qs, (-1, self.nq))
         out = np.empty((len(places) * self.nv, self.nv))
-        if not entries.mass_matrices_at(self._scratch.parts, places.reshape(-1), out):
+        if not self._entries.mass_matrices_at(self._scratch.parts, places.reshape(-1), out):
             self._check_states(places)
         return out.reshape(len(places), self.nv, self.nv)
 
@@ -166,7 +170,7 @@ class Mechanism:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
         place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
         out = np.empty(self.nv)
-        if not entries.biases_at(self._scratch.parts, place, rates, out):
+        if not self._entries.biases_at(self._scratch.parts, place, rates, out):
             self._place(place)
             self._rates(rates)
         return out
@@ -177,28 +181,28 @@ class Mechanism:
         if len(places) != len(rates):
             raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
         out = np.empty(rates.size)
-        if not entries.biases_at(self._scratch.parts, places.reshape(-1), rates.reshape(-1), out):
+        if not self._entries.biases_at(self._scratch.parts, places.reshape(-1), rates.reshape(-1), out):
             self._check_states(places, rates)
         return out.reshape(rates.shape)
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
-        return self._filled((self.nv,), entries.gravity, self._at(q), finite_array("g", g, (3,), "m/s^2"))
+        return self._filled((self.nv,), self._entries.gravity, self._at(q), finite_array("g", g, (3,), "m/s^2"))
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
         """Return tau = M dv + B + G (d,)."""
         given = self._at(q), self._rates(v), self._rates(dv, "dv"), finite_array("g", g, (3,), "m/s^2")
-        return self._filled((self.nv,), entries.inverse_dynamics, *given)
+        return self._filled((self.nv,), self._entries.inverse_dynamics, *given)
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
         """Return J (3, d): velocity, in world axes, of the world point [m] regarded as fixed to the body."""
         place = finite_array("point", point, (3,), "m")
-        return self._filled((6, self.nv), entries.frame_jacobian, self._at(q), self.index(body), place)[:3]
+        return self._filled((6, self.nv), self._entries.frame_jacobian, self._at(q), self.index(body), place)[:3]
 
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
         """Return J (6, d): velocity of the body's origin (rows 0-2) and angular velocity (rows 3-5), in world axes."""
         at, b = self._at(q), self.index(body)
-        return self._filled((6, self.nv), entries.frame_jacobian, at, b, at.position[b])
+        return self._filled((6, self.nv), self._entries.frame_jacobian, at, b, at.position[b])
 
     def rows_along(self, qs: ArrayLike, bodies: ArrayLike, points: ArrayLike, directions: ArrayLike) -> Floats:
         """Return directionᵀ J (n, d) of n world points (n, 3): point i is fixed to bodies[i] at configuration qs[i].
@@ -213,13 +217,13 @@ class Mechanism:
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
         self._check_states(places)
         given = self._scratch.workspace, places, fixed_to, spots, along
-        return self._filled((len(places), self.nv), entries.rows_along, *given)
+        return self._filled((len(places), self.nv), self._entries.rows_along, *given)
 
     def energies(self, qs: ArrayLike, vs: ArrayLike, g: ArrayLike) -> tuple[Floats, Floats]:
         """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for the field g (3,)."""
         places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
         field, (kinetic, potential) = finite_array("g", g, (3,), "m/s^2"), np.zeros((2, len(places)))
-        entries.energies_along(self.block, self._scratch.workspace, places, rates, field, kinetic, potential)
+        self._entries.energies_along(self.block, self._scratch.workspace, places, rates, field, kinetic, potential)
         return kinetic, potential
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
@@ -238,16 +242,16 @@ class Mechanism:
         """
         places = float_array("qs", qs, (-1, self.nq))
         shape = max(len(places) - 1, 0), self.nv
-        return self._filled(shape, entries.displacements_along, places, bool(straight))
+        return self._filled(shape, self._entries.displacements_along, places, bool(straight))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return (6,): momentum [N s] and angular momentum [N m s] about the moving bodies' centre of mass."""
-        return self._filled((6,), entries.centroidal_momentum, self._at(q), self._rates(v))
+        return self._filled((6,), self._entries.centroidal_momentum, self._at(q), self._rates(v))
 
     def _at(self, q: ArrayLike) -> Block:
         """Return this thread's scratch with the kinematics of q; the next call overwrites it."""
         workspace: Block = self._scratch.workspace
-        entries.forward_kinematics(self.block, self._place(q), workspace)
+        self._entries.forward_kinematics(self.block, self._place(q), workspace)
         return workspace
 
     def _filled(self, shape: tuple[int, ...], kernel: Callable[..., None], *given: Any) -> Floats:
@@ -258,12 +262,12 @@ class Mechanism:
     def _rates(self, v: ArrayLike, name: str = "v") -> Floats:
         """Return a velocity (nv,) of finite numbers, or raise ArgumentError."""
         rates = float_array(name, v, (self.nv,))
-        return rates if entries.all_finite(rates) else finite_array(name, v, (self.nv,))
+        return rates if self._entries.all_finite(rates) else finite_array(name, v, (self.nv,))
 
     def _place(self, q: ArrayLike, name: str = "q") -> Floats:
         """Return a configuration (nq,) of finite numbers whose quaternions have length one, or raise ArgumentError."""
         place = float_array(name, q, (self.nq,))
-        b = entries.misplaced_body(self.block, place)
+        b = self._entries.misplaced_body(self.block, place)
         if b >= 0:
             finite_array(name, q, (self.nq,))
             first, units = int(self.arrays.q_start[b]), self.bodies[b].joint.layout.coordinate_units

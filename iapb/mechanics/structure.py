@@ -47,6 +47,7 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
         dof_body=np.repeat(np.arange(count), v_count),
         dof_parent=np.array(dof_parent, np.int64),
         dof_rotates=np.array([turns for layout in layouts for turns in layout.rotating], np.bool_),
+        quaternions=flag(any(layout.code in (SPHERICAL, FREE_FLYER) for layout in layouts)),
     )
 
 
@@ -69,7 +70,8 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         carrier.append(b if moves[b] else carrier[parent] if parent >= 0 else -1)
     moving, carriers = np.flatnonzero(moves), np.array(carrier)
     new_index = {b: i for i, b in enumerate(moving.tolist())} | {-1: -1}
-    parts = m._replace(**{name: rows[moving] for name, rows in m._asdict().items() if not name.startswith("dof_")})
+    parts = m._replace(**{name: rows[moving] for name, rows in m._asdict().items()
+                          if not name.startswith(("dof_", "quaternions"))})
     parts = parts._replace(
         parent=np.array([new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64),
         dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64))

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 import re
 from datetime import date
+from functools import partial
 from typing import Annotated
 
 import typer
 
 from iapb.errors import ArgumentError
-from reports.commands.answer import Answer, Json
-from reports.commands.lines import sentence
-from reports.commands.progress import stage_progress
 from reports.provenance import processor
+from reports.show import Answer, Json, sentence, stage_progress
 from verification.cost.impacts import choices, short_time, which_method, work_precision
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
 from verification.haptic_rate import haptic_study
@@ -34,8 +33,8 @@ def bench(
     if budget:
         return _recommended(seconds_of(budget), contacts, coordinates)
     with stage_progress() as progress:
-        topic = haptic_study("full" if full else "quick", lambda done, total: progress("tables", done, total))
-        methods = work_precision(progress=lambda done, total: progress("methods on problems", done, total))
+        topic = haptic_study("full" if full else "quick", partial(progress, "tables"))
+        methods = work_precision(progress=partial(progress, "methods on problems"))
     facts = {"processor": processor(), "verdict": topic.verdict, "parts": topic.parts, "failures": topic.failures,
              "tables": {name: table.records() for name, table in topic.tables.items()} | {
                  "methods on problems": methods.records()}}  # fmt: skip

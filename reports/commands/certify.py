@@ -16,8 +16,7 @@ from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
 from iapb.advice.certificate import EXPORT_HEAD, exported, exported_run
 from iapb.errors import ArgumentError, RunFileError
-from reports.commands.answer import Answer, Json
-from reports.commands.run import counted
+from reports.show import Answer, Json, counted
 from reports.store.io import written_aside
 from reports.store.runs import read_run
 
@@ -32,8 +31,9 @@ def certify(
     json_: Json = False,
 ) -> Answer:
     """Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent."""
-    paths = list(dict.fromkeys(path for given in files for path in _files(given)))
-    found = _exported(paths, export) if export else {path: certificate_of(path) for path in paths}
+    paths = list(dict.fromkeys(path for given in files
+                               for path in (sorted(given.rglob("*.h5")) if given.is_dir() else [given])))
+    found = _exported(paths, export) if export else {path: _certificate(path) for path in paths}
     failed = [path for path, one in found.items() if not one.passed]
     judged = {path: asdict(one) | {"passed": one.passed, "words": one.words()} for path, one in found.items()}
     return Answer({"passed": not failed, "files": judged}, list(_lines(found, failed)), 1 if failed else 0)
@@ -45,7 +45,7 @@ def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
         raise ArgumentError("--export", str(export), "a new file, not one of the certified files")
     with written_aside(export.resolve(), replace=True) as aside, aside.open("w", encoding="utf-8") as target:
         target.write(f"{EXPORT_HEAD}\n")
-        found = {path: certificate_of(path, target) for path in paths}
+        found = {path: _certificate(path, target) for path in paths}
         target.write(f"end {sum(one.impacts for one in found.values())}\n")
     return found
 
@@ -70,14 +70,14 @@ def _lines(found: dict[Path, Certificate], failed: list[Path]) -> Iterator[str]:
             yield f"\nImpact {found[path].first_gain} of {path}:\n{found[path].counterexample}"
 
 
-def certificate_of(path: Path, export: TextIO | None = None) -> Certificate:
+def _certificate(path: Path, export: TextIO | None = None) -> Certificate:
     """Return the certificate of a run file or of an impact archive of any engine; write its impacts to `export`."""
-    if path.suffix != ".npz":
-        run = read_run(path)
-        certificate, lines = certify_run(run), exported_run(run)
-    else:
+    if path.suffix == ".npz":
         arrays = _archived(path)
         certificate, lines = certify_impacts(**arrays), exported(*(arrays[name] for name in _GIVEN))
+    else:
+        run = read_run(path)
+        certificate, lines = certify_run(run), exported_run(run)
     if export:
         export.writelines(f"{line}\n" for line in lines)
     return certificate
@@ -93,7 +93,3 @@ def _archived(path: Path) -> dict[str, np.ndarray]:
     if missing:
         raise RunFileError(f"{path}: {', '.join(missing)} missing; docs/report.md states the format")
     return arrays
-
-
-def _files(given: Path) -> list[Path]:
-    return sorted(given.rglob("*.h5")) if given.is_dir() else [given]

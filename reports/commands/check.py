@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from iapb.advice.checks import Caution, Start, check_scene, settled, step_limits
-from reference.worlds import find_world
-from reports.commands.answer import Answer, Json
+from iapb.worlds import find_world
 from reports.commands.run import DISTRUSTED, SceneName, Values, cost_in_words, scene_given
+from reports.show import Answer, Json
 
 
 def check(
@@ -27,9 +27,9 @@ def check(
         cautions = (*cautions, Caution("size", source.name, said))
     elif said:
         remarks = (*remarks, f"{source.name} in {world}: {said}")
-    explicit = source.contact.forces == "paper"  # implicit contact has no such limits
-    limits = step_limits(Start(source), getattr(law, "integrator", "semi_implicit_euler")) if explicit else None
-    lines = [f"{remark}." for remark in remarks]
+    lines, limits = [f"{remark}." for remark in remarks], None
+    if source.contact.forces == "paper":  # implicit contact has no such limits
+        limits = step_limits(Start(source), getattr(law, "integrator", "semi_implicit_euler"))
     if limits is not None:
         lines.append(f"At {source.rate:g} Hz the step holds contact.stiffness <= {limits.stiffness:.3g} N/m and "
                      f"contact.damping <= {limits.damping:.3g} N s/m, each with the other unchanged; critical "

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import math
 import re
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,14 +13,10 @@ import typer
 from iapb.errors import ArgumentError
 from reference.datasets import problem_files, write_fclib
 from reference.worlds import run_world
-from reports.commands.answer import Answer, Json
-from reports.commands.lines import sentence, table_lines
-from reports.commands.progress import stage_progress
 from reports.commands.run import Values, scene_given
-from reports.figures.figure import NotComputed, draw
-from reports.figures.standalone import standalone
+from reports.figures.figure import Figure, draw, standalone
 from reports.figures.worlds import worlds as worlds_figure
-from reports.store.keys import plain
+from reports.show import Answer, Json, sentence, stage_progress, table_text
 from verification.check import Topic
 from verification.complementarity.solvers import collections, own_problems
 from verification.complementarity.topic import complementarity
@@ -37,6 +33,7 @@ _SHOWN = {
                  "largest change of KE, IAPB"),
     "convergence": ("scene", "events", "step", "error of positions", "order, positions", "order, velocities"),
 }  # fmt: skip
+_FACTORS = (1.0, 3.0, 10.0, 100.0, 1e5)  # of the printed performance profile
 
 
 def compare(
@@ -71,40 +68,38 @@ def compare(
         if given and scene is None:
             raise typer.BadParameter("give a SCENE", param_hint=option)
     for folder in problems or ():
-        _require_problems(folder)
+        if not problem_files(folder):
+            kinds = ".lcp, .lcp.gz, .dat, .txt, .hdf5, .h5"
+            raise ArgumentError("--problems", str(folder), f"a folder with problem files ({kinds})")
     if export is not None:
         export.mkdir(parents=True, exist_ok=True)
         with stage_progress() as progress:
             progress("our own problems", 0, 1)
             count = _export(export)
         return Answer({"problems": count, "folder": export}, [f"{count} problems written to {export}"])
-    figure, folders = "", {str(folder): folder for folder in problems or ()}
+    folders = {str(folder): folder for folder in problems or ()}
     with stage_progress() as progress:
         if scene is not None:
             found = compare_worlds(scene_given(scene, set_), worlds.split(",") if worlds else None, against,
                                    impacts=impacts, progress=progress)  # fmt: skip
-            lines, place, figure = _scene_lines(found), out or FOLDER / f"{found.details['scene']}.json", _figure(found)
-        elif only_problems:
-            found, place = _compared(_problems_alone({**folders}), True, progress), out or FOLDER / "problems.json"
-            lines = _problem_lines(found)
+            name, lines = found.details["scene"], _scene_lines(found)
         else:
-            found, place = _compared(complementarity(folders), full, progress), out or FOLDER / "complementarity.json"
-            lines = _study_lines(found)
-    facts = plain_finding(found)
-    place.parent.mkdir(parents=True, exist_ok=True)
-    place.write_text(json.dumps(facts, ensure_ascii=False), encoding="utf-8")
+            alone = Topic(key="problems", title="Solvers on problem files", question="",
+                          checks=collections({**folders}), says=lambda tables, parts: "")  # fmt: skip
+            topic = alone if only_problems else complementarity(folders)
+            found = topic(run_world, "full" if full or only_problems else "quick", partial(progress, topic.title))
+            name, lines = topic.key, _problem_lines(found) if only_problems else _study_lines(found)
+    place = out or FOLDER / f"{name}.json"
     lines += [sentence(part.sentence, "• ") for part in found.parts]
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in found.failures]
-    if figure:
-        place.with_suffix(".svg").write_text(figure, encoding="utf-8")
+    drawn = draw(worlds_figure, found.tables) if scene is not None else None
+    place.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(drawn, Figure):
+        place.with_suffix(".svg").write_text(standalone(drawn), encoding="utf-8")
         lines.append(f"Figure: {place.with_suffix('.svg')}")
-    return Answer(facts, [*lines, f"Stored in {place}"], 1 if found.failures else 0)
-
-
-def _require_problems(folder: Path) -> None:
-    if not problem_files(folder):
-        kinds = ".lcp, .lcp.gz, .dat, .txt, .hdf5, .h5"
-        raise ArgumentError("--problems", str(folder), f"a folder with problem files ({kinds})")
+    answer = Answer(_facts(found), [*lines, f"Stored in {place}"], 1 if found.failures else 0)
+    place.write_text(answer.text(json_=True), encoding="utf-8")
+    return answer
 
 
 def _export(folder: Path) -> int:
@@ -112,44 +107,21 @@ def _export(folder: Path) -> int:
     problems = [stored.problem for stored in own_problems()]
     for problem in problems:
         title = problem.name.replace("μ", "mu")  # FCLIB's titles are ASCII
-        name = re.sub(r"[^a-z0-9.]+", "_", title.lower())
-        write_fclib(folder / f"{name}.hdf5", problem, title)
+        write_fclib(folder / f"{re.sub(r'[^a-z0-9.]+', '_', title.lower())}.hdf5", problem, title)
     return len(problems)
 
 
-def _problems_alone(folders: dict[str, Path | None]) -> Topic:
-    return Topic(key="problems", title="Solvers on problem files", question="", checks=collections(folders),
-                 says=lambda tables, parts: "")  # fmt: skip
-
-
-def _compared(topic: Topic, full: bool, progress: Any) -> Finding:
-    return topic(run_world, "full" if full else "quick", lambda done, total: progress(topic.title, done, total))
-
-
-def plain_finding(found: Finding) -> dict[str, Any]:
-    """Return a finding as plain JSON values: texts, numbers and tables; null for a number that is not finite."""
+def _facts(found: Finding) -> dict[str, Any]:
+    """Return a finding as JSON values: texts, numbers and tables as columns and rows."""
     parts = [{"name": part.name, "verdict": part.verdict, "sentence": part.sentence} for part in found.parts]
-    tables = {name: {"columns": list(table.titles), "rows": [[_cell(value) for value in row] for row in table.cells]}
-              for name, table in found.tables.items()}  # fmt: skip
+    tables = {name: {"columns": table.titles, "rows": table.cells} for name, table in found.tables.items()}
     return {"question": found.question, "answer": found.answer, "verdict": found.verdict, "parts": parts,
             "details": dict(found.details), "tables": tables}  # fmt: skip
 
 
-def _cell(value: Any) -> Any:
-    value = plain(value)
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _figure(found: Finding) -> str:
-    drawn = draw(worlds_figure, found.tables)
-    return "" if isinstance(drawn, NotComputed) else standalone(drawn)
-
-
-def _scene_lines(found: Finding) -> list[str]:
+def _scene_lines(found: Finding) -> list[str | Table]:
     """Return one page of text: distances, energy and time by world, then the results of the solvers on the impacts."""
     table, against = found.tables["worlds"], found.details["against"]
-    lines = [found.title, sentence(found.answer)]
-    lines += [sentence(f"{row['world']} ignores {row['ignores']}.") for row in table.records() if row["ignores"]]
     others = table.only(name != against for name in table.column("world"))
     far = titled(
         ("world", "apart, rms [mm]", "most [mm]", "end [mm]", "velocity, rms [mm/s]", "impulse, rms [N s]",
@@ -158,76 +130,69 @@ def _scene_lines(found: Finding) -> list[str]:
           1e3 * row["velocity, rms"], row["impulse, rms"], row["impulse, end"]) for row in others.records()], 3)
     rest = ("world", "energy lost", "most above start and work", "deepest overlap", "impacts", "time per step",
             "times the fastest")  # fmt: skip
-    lines += ["", f"Distance from {against} (impulse: {found.details['impulse']})", *table_lines(far)]
-    lines += ["", "Energy, penetration, time", *table_lines(table.select(rest))]
+    ignoring = (sentence(f"{row['world']} ignores {row['ignores']}.") for row in table.records() if row["ignores"])
+    lines: list[str | Table] = [
+        found.title, sentence(found.answer), *ignoring,
+        "", f"Distance from {against} (impulse: {found.details['impulse']})", far,
+        "", "Energy, penetration, time", table.select(rest)]  # fmt: skip
     if "solvers" in found.tables:
         every = found.tables["solvers"]
         there = every.only(row["missing"] < row["problems"] for row in every.records())
-        shown = there.without("left out", "missing", "spread of velocities")
-        lines += ["", "Its impacts as problems, by every solver", *table_lines(shown)]
-        lines += [sentence(text, "  ") for text in _unsolved(found.tables["problems"])]
-        absent = [name for name in every.column("solver") if name not in there.column("solver")]
-        lines += [sentence(f"Not installed: {', '.join(absent)}.", "  ")] if absent else []
+        lines += ["", "Its impacts as problems, by every solver",
+                  there.without("left out", "missing", "spread of velocities"),
+                  *(sentence(text, "  ") for text in _unsolved(found.tables["problems"]))]
+        if absent := [name for name in every.column("solver") if name not in there.column("solver")]:
+            lines.append(sentence(f"Not installed: {', '.join(absent)}.", "  "))
     return [*lines, ""]
 
 
-def _unsolved(problems: Table) -> list[str]:
-    """Return one line for each solver and failing outcome: which problems it did not solve, and why."""
-    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for row in problems.records():
-        if row["outcome"] not in ("solved", "missing"):
-            found.setdefault((row["solver"], row["outcome"]), []).append(row)
-    said = []
-    for (solver, outcome), rows in found.items():
-        residual = rows[0]["worst residual"]
-        why = ": ".join(filter(None, [f"residual {residual:.1e}" if residual else "", rows[0]["note"]]))
-        said.append(f"{solver} {outcome} {len(rows)}, such as {rows[0]['problem']}: {why.removeprefix('refused: ')}")
-    return said
+def _unsolved(problems: Table) -> Iterator[str]:
+    """Yield one line for each solver and failing outcome: how many problems it did not solve, one of them, and why."""
+    failed = problems.only(outcome not in ("solved", "missing") for outcome in problems.column("outcome"))
+    for solver, outcome in dict.fromkeys(zip(failed.column("solver"), failed.column("outcome"), strict=True)):
+        first, *others = failed.where(solver=solver, outcome=outcome).records()
+        residual = first["worst residual"]
+        why = ": ".join(filter(None, [f"residual {residual:.1e}" if residual else "", first["note"]]))
+        yield f"{solver} {outcome} {1 + len(others)}, such as {first['problem']}: {why.removeprefix('refused: ')}"
 
 
-def _study_lines(found: Finding) -> list[str]:
-    lines: list[str] = []
+def _study_lines(found: Finding) -> list[str | Table]:
+    lines: list[str | Table] = []
     for name, keys in _SHOWN.items():
         if name in found.tables:
-            lines += [sentence(found.tables[name].note) or name, *table_lines(found.tables[name].select(keys)), ""]
-    if "time per impact" in found.tables:
-        lines += ["Time per impact [µs], median", *table_lines(_costs(found.tables["time per impact"]), keys=2), ""]
+            lines += [sentence(found.tables[name].note) or name, found.tables[name].select(keys), ""]
+    if "time per impact" in found.tables:  # a row per kind and size, a column per solver
+        cells: dict[tuple[Any, ...], dict[str, str]] = {}
+        for row in found.tables["time per impact"].records():
+            time = None if row["median"] is None else f"{row['median']:.3g}"
+            said = " ".join(filter(None, [time, "" if row["outcome"] == "solved" else row["outcome"]]))
+            cells.setdefault((row["impacts"], row["contacts"]), {})[row["solver"]] = said
+        solvers = dict.fromkeys(found.tables["time per impact"].column("solver"))
+        by_solver = titled(("impacts", "contacts", *solvers),
+                           [(*key, *(cells[key].get(solver) for solver in solvers)) for key in sorted(cells)])
+        lines += ["Time per impact [µs], median", table_text(by_solver, keys=2), ""]
     return lines + _problem_lines(found)
 
 
-def _costs(table: Table) -> Table:
-    """Return a table with a row per kind of impact and size and a column per solver; unsolved cells say so."""
-    cells: dict[tuple[Any, ...], dict[str, Any]] = {}
-    for row in table.records():
-        time = row["median"]
-        failed = "" if row["outcome"] == "solved" else row["outcome"]
-        said = " ".join(filter(None, ["" if time is None else f"{time:.3g}", failed]))
-        cells.setdefault((row["impacts"], row["contacts"]), {})[row["solver"]] = said
-    solvers = list(dict.fromkeys(table.column("solver")))
-    return titled(("impacts", "contacts", *solvers),
-                  [(*key, *(cells[key].get(solver) for solver in solvers)) for key in sorted(cells)])
-
-
-def _problem_lines(found: Finding) -> list[str]:
+def _problem_lines(found: Finding) -> list[str | Table]:
     """Return the problems, each with the names of the solvers that did not solve it, and the profiles of times."""
-    lines = []
+    lines: list[str | Table] = []
     for folder in (name for name, table in found.tables.items() if "why not read" in table.keys):
-        rows: list[tuple[Any, ...]] = []
+        rows = []
         for row in found.tables[folder].records():
+            unread = row["why not read"] and f"not read: {row['why not read']}"
             others = ", ".join(f"{name} {said}" for name, said in row.items() if said in ("refused", "failed"))
-            why = f"not read: {row['why not read']}" if row["why not read"] else others or None
-            solved = None if row["why not read"] else sum(said == "solved" for said in row.values())
-            rows.append((row["problem"], row.get("unknowns"), row.get("rank"), solved, why))
-        by_problem = titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows)
-        profile, shown = found.tables["profile"].where(collection=folder), (1.0, 3.0, 10.0, 100.0, 1e5)
+            solved = None if unread else sum(said == "solved" for said in row.values())
+            rows.append((row["problem"], row.get("unknowns"), row.get("rank"), solved, unread or others or None))
         shares: dict[tuple[str, str], list[float]] = {}
-        for row in profile.records():
-            within = shares.setdefault((row["solver"], row["kind"]), [0.0] * len(shown))
-            for k, factor in enumerate(shown):
+        for row in found.tables["profile"].where(collection=folder).records():
+            within = shares.setdefault((row["solver"], row["kind"]), [0.0] * len(_FACTORS))
+            for k, factor in enumerate(_FACTORS):
                 within[k] = row["share solved"] if row["factor"] <= factor * (1 + 1e-9) else within[k]
-        by_factor = titled(("solver", "kind", *(f"within {factor:g}" for factor in shown)),
-                           [(*key, *(f"{100 * share:.0f} %" for share in within)) for key, within in shares.items()])
-        lines += [f"{folder}: every solver on every problem", *table_lines(by_problem), "",
+        lines += [f"{folder}: every solver on every problem",
+                  titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows), "",
                   "Performance profile (Dolan and Moré): solved within a factor of the fastest",
-                  *table_lines(by_factor), ""]  # fmt: skip
+                  titled(("solver", "kind", *(f"within {factor:g}" for factor in _FACTORS)),
+                         [(*key, *(f"{100 * share:.0f} %" for share in within)) for key, within in shares.items()]),
+                  ""]  # fmt: skip
     return lines

@@ -9,10 +9,9 @@ import typer
 from iapb import decide_effects
 from iapb.advice.effects import ignored_fields
 from iapb.errors import ArgumentError
-from reference.worlds import find_world
-from reports.commands.answer import Answer, Json
-from reports.commands.progress import stage_progress
+from iapb.worlds import find_world
 from reports.commands.run import Rendering, SceneName, scene_given
+from reports.show import Answer, Json, stage_progress
 from verification.cost.effects import NOTHING, effects_of, summary
 from verification.table import titled
 
@@ -32,16 +31,11 @@ def effects(
     source = scene_given(scene, None)
     if measure:
         return _measured(source, world or "IAPB")
-    if world is None:
-        found = decide_effects(source)
-    else:
-        chosen = find_world(world, rendering)
-        found = decide_effects(source, chosen.law, chosen.coupling_in(source))
-    on = [effect for effect in found if effect.active]
-    ignored = ignored_fields(found)
+    chosen = find_world(world, rendering) if world else None
+    found = decide_effects(source, chosen.law, chosen.coupling_in(source)) if chosen else decide_effects(source)
+    on, ignored = [effect for effect in found if effect.active], ignored_fields(found)
     said = f" ({world} ignores {', '.join(ignored)})" if ignored else ""
-    lines = [f"Effects of {source.name}" + (f" in {world}" if world else "")
-             + f": what is on, and what it prevents{said}"]  # fmt: skip
+    lines = [f"Effects of {source.name}{f' in {world}' if world else ''}: what is on, and what it prevents{said}"]
     lines += [f"  {one.name:<20}{one.reason}\n{'':<22}without it: {one.left_out}" for one in on]
     lines += ["Off, because", *(f"  {one.name:<20}{one.reason}" for one in found if not one.active)]
     lines.append(f"{len(on)} of {len(found)} effects are on; the others cost nothing.")
@@ -54,14 +48,14 @@ def _measured(source: Any, world: str) -> Answer:
         raise ArgumentError("world", world, "IAPB or PB: --measure needs a world of the compiled engine")
     with stage_progress() as progress:
         progress("with and without each effect", 0, 1)
-        found = effects_of(source, world)
-    best = {row["effect"]: row["best of its error"] for row in summary({source.name: found}).records()}
+        table = effects_of(source, world)
+    found = table.records()
+    best = {row["effect"]: row["best of its error"] for row in summary({source.name: table}).records()}
     rows = [(one["effect"], "on" if one["active"] else "off", one["reason"], one["cost"],
-             (one["change"] or one["left out"]) if one["active"] else None, best.get(one["effect"]))
-            for one in found.records()]  # fmt: skip
+             (one["change"] or one["left out"]) if one["active"] else None, best.get(one["effect"])) for one in found]
     shown = titled(("effect", "on", "why", "cost", "changes without it", "best of its error"), rows)
-    best_said = "Best of its error: no other effect saves more time at the cost of no larger error."
-    idle = [one["effect"] for one in found.records() if (one["change"] or "").startswith(NOTHING)]
-    said = [f"On, and change nothing in this run: {', '.join(idle)}."] if idle else []
-    return Answer({"scene": source.name, "world": world, "measured": found.records()},
-                  [f"Effects of {source.name} in {world}, measured", shown, best_said, *said])
+    lines: list[Any] = [f"Effects of {source.name} in {world}, measured", shown,
+             "Best of its error: no other effect saves more time at the cost of no larger error."]
+    if idle := [one["effect"] for one in found if (one["change"] or "").startswith(NOTHING)]:
+        lines.append(f"On, and change nothing in this run: {', '.join(idle)}.")
+    return Answer({"scene": source.name, "world": world, "measured": found}, lines)

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import closing, nullcontext
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, TextIO
+from typing import Annotated
 
 import typer
 
 from iapb.compiling import compiling_told, to_stderr
 from iapb.errors import ArgumentError
-from iapb.simulation import INTERRUPTED, Simulation
-from reference.worlds import find_world
-from reports.commands.answer import Json, print_json
-from reports.commands.run import Rendering, SceneName, Values, counted, duration, scene_given
+from iapb.simulation import INTERRUPTED
+from iapb.worlds import find_world
+from reports.commands.run import Rendering, SceneName, Values, scene_given
 from reports.live.budget import calibrated
 from reports.live.deadline import Pace
 from reports.live.device import live_simulation
 from reports.live.loop import Loop
-from reports.live.replay import finish_live, open_log
+from reports.live.replay import finish_live, open_parts
 from reports.live.viewer import Viewer
-from reports.store.logs import RunLog
+from reports.show import Answer, Json, counted, duration
 
 LONGEST = 1e8  # ticks: at 1 kHz more than a day
 
@@ -42,7 +43,7 @@ def live(
     set_: Values = None,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/live"),
     json_: Json = False,
-) -> None:
+) -> Answer:
     """Simulate SCENE in real time, report missed deadlines, and store the run and its tick times."""
     if not 0.0 < rate < float("inf"):
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")
@@ -52,73 +53,52 @@ def live(
     out.mkdir(parents=True, exist_ok=True)  # an unusable folder is reported before the run, not after it
     with compiling_told(to_stderr):
         simulation = live_simulation(source, find_world(world, rendering), rate, device)
-        name = f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"
-        ticks = round(seconds * rate)
-        log = open_log(out, name, simulation, world, ticks)
+        ticks, length = round(seconds * rate), f"{round(seconds * rate) / rate:.4g} s; Ctrl-C ends it before."
+        parts = open_parts(out, f"{source.name}-{datetime.now(UTC):%Y%m%dT%H%M%S%f}", simulation, world, ticks)
         try:
-            stopped = _held(simulation, ticks, budget, port if view else None, log,
-                            sys.stderr if json_ else sys.stdout)
-            run, timetable, pace = finish_live(log.path, stopped, log.steps)
+            rows = calibrated(simulation, simulation.system.dt) if budget else None
+            with closing(Viewer(simulation, port)) if view else nullcontext() as viewer:
+                loop = Loop(simulation, ticks, budget=rows, audience=viewer, parts=parts)
+                under_way = f"See it, and drag the handle, at {viewer.start()}" if viewer else "Under way"
+                print(f"{under_way} for {length}", file=sys.stderr if json_ else sys.stdout, flush=True)
+                stopped = loop.stream()
+            run, timetable, pace = finish_live(parts.folder, stopped, parts.steps)
         except BaseException:
-            log.close(remove=log.steps == 0)
-            if log.steps:
-                print(f"What was done is in {log.path}; iapb store repair {out} makes it readable.", file=sys.stderr)
+            parts.close(remove=parts.steps == 0)
+            if parts.steps:
+                to_stderr(f"What was done is in {parts.folder}; iapb store repair {out} makes it readable.")
             raise
-        log.close(remove=True)
-    if json_:
-        print_json(asdict(pace) | {"run": run, "timetable": timetable, "stopped": stopped})
-    else:
-        describe(pace)
-        print(f"Run: {run}\nTimetable: {timetable}")
-        if stopped:
-            print(f"Stopped: {stopped}. What was done is in the files.")
+        parts.close(remove=True)
+    lines = [*describe(pace), f"Run: {run}\nTimetable: {timetable}"]
     if stopped:
-        raise typer.Exit(130 if stopped == INTERRUPTED else 1)
+        lines.append(f"Stopped: {stopped}. What was done is in the files.")
+    return Answer(asdict(pace) | {"run": run, "timetable": timetable, "stopped": stopped}, lines,
+                  (130 if stopped == INTERRUPTED else 1) if stopped else 0)
 
 
-def _held(simulation: Simulation, ticks: int, budget: bool, port: int | None, log: RunLog, to: TextIO) -> str:
-    """Run the ticks and return what stopped them. With a `port`, start a viewer and print its address to `to`."""
-    rows = calibrated(simulation, simulation.system.dt) if budget else None
-    length = f"{ticks * simulation.system.dt:.4g} s; Ctrl-C ends it before."
-    if port is None:
-        loop = Loop(simulation, ticks, budget=rows, log=log)
-        print(f"Under way for {length}", file=to, flush=True)
-        return loop.stream()
-    viewer = Viewer(simulation, port)
-    try:
-        loop = Loop(simulation, ticks, budget=rows, audience=viewer, log=log)
-        print(f"See it, and drag the handle, at {viewer.start()} for {length}", file=to, flush=True)
-        return loop.stream()
-    finally:
-        viewer.stop()
-
-
-def describe(pace: Pace) -> None:
-    """Print in sentences how well the loop kept its deadlines."""
-    print(f"{pace.scene}: {pace.ticks} ticks at {pace.rate:g} Hz, {1e3 / pace.rate:.4g} ms each.")
+def describe(pace: Pace) -> Iterator[str]:
+    """Yield in sentences how well the loop kept its deadlines."""
+    yield f"{pace.scene}: {pace.ticks} ticks at {pace.rate:g} Hz, {1e3 / pace.rate:.4g} ms each."
     for what, times in (("A tick's work took", pace.work), ("It began late by", pace.lateness)):
         half, ninety, hundredth, thousandth, worst = map(duration, times)
-        print(f"{what} {half} in the median; {ninety} at 90 %, {hundredth} at 99 %, {thousandth} at 99.9 %, "
-              f"{worst} at worst.")
-    print(_misses(pace))
-    print(_rows(pace))
-
-
-def _misses(pace: Pace) -> str:
+        yield (f"{what} {half} in the median; {ninety} at 90 %, {hundredth} at 99 %, {thousandth} at 99.9 %, "
+               f"{worst} at worst.")
     if not pace.missed:
-        return "No deadline was missed: simulated time is the clock's."
-    share = 100.0 * pace.missed / pace.ticks
-    were = "was" if pace.missed == 1 else "were"
-    return (f"{counted(pace.missed, 'deadline')} {were} missed ({share:.3g} %). No step was left out: what came "
-            f"after was done that much later, and simulated time is {duration(pace.behind)} behind the clock.")
-
-
-def _rows(pace: Pace) -> str:
-    if not pace.collisions:
-        return "No collision was resolved by an impulse."
+        yield "No deadline was missed: simulated time is the clock's."
+    else:
+        share = 100.0 * pace.missed / pace.ticks
+        yield (f"{counted(pace.missed, 'deadline')} {_were(pace.missed)} missed ({share:.3g} %). No step was left out: "
+               f"what came after was done that much later, and simulated time is {duration(pace.behind)} behind the "
+               "clock.")
     collisions, left_out = counted(pace.collisions, "collision"), pace.rows_left_out
-    if not left_out:
-        return f"{collisions}, each with all the rows it needed (the least budget was {pace.least_rows})."
-    were = "was" if left_out == 1 else "were"
-    return (f"{collisions}; the time left gave them {counted(pace.least_rows, 'row')} at the least, and "
-            f"{counted(left_out, 'row')} that still approached {were} left to the next steps.")
+    if not pace.collisions:
+        yield "No collision was resolved by an impulse."
+    elif not left_out:
+        yield f"{collisions}, each with all the rows it needed (the least budget was {pace.least_rows})."
+    else:
+        yield (f"{collisions}; the time left gave them {counted(pace.least_rows, 'row')} at the least, and "
+               f"{counted(left_out, 'row')} that still approached {_were(left_out)} left to the next steps.")
+
+
+def _were(count: int) -> str:
+    return "was" if count == 1 else "were"

@@ -11,10 +11,10 @@ from typing import Annotated
 import typer
 
 from iapb.errors import ArgumentError
-from reports.commands.answer import Answer, Json
 from reports.difference import DIFFERS, PARTS, SHOWN, Difference, compare_reports, parts, sentences, unlike
 from reports.difference import lines as largest
 from reports.numbers_file import read_numbers
+from reports.show import Answer, Json
 from verification.table import Table, titled
 
 

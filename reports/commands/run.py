@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,20 +12,18 @@ import typer
 
 from iapb.advice.checks import check_scene
 from iapb.advice.effects import ignored_fields
+from iapb.compiling import to_stderr
 from iapb.errors import RunFileError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.simulation import INTERRUPTED
 from iapb.system import System
-from reference.time_stepping import RigidConstraints, cost_of
-from reference.worlds import find_world
-from reports.commands.answer import Answer, Json
-from reports.commands.progress import step_progress
+from iapb.worlds import find_world
 from reports.runner import Runner
-from reports.store.folder import Place
+from reports.show import Answer, Json, counted, duration, stage_progress
 from reports.store.io import blocks
+from reports.store.parts import parts_of
 from reports.store.runs import opened_run
-from reports.streaming import Streamed, log_of
 from reports.uses import parsed
 
 SceneName = Annotated[str, typer.Argument(
@@ -35,6 +33,9 @@ Rendering = Annotated[str, typer.Option(
     help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")]  # fmt: skip
 Values = Annotated[list[str] | None, typer.Option(
     "--set", help="Change a value: contact.friction=0.3, bodies.peg.position=[0.03,-0.01,0]. Repeatable.")]  # fmt: skip
+WORTH_SAYING = 60.0  # [s] expected computing time
+DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
+SHOWN_COORDINATES = 12  # more would not fit into a readable line
 
 
 def scene_given(name: str, values: list[str] | None) -> Scene:
@@ -67,53 +68,45 @@ def run(
     law = find_world(world, rendering).law
     cautions, (said, _) = check_scene(source, law), cost_in_words(source, law)
     if said:
-        print(f"{source.name} in {world}: {said}.", file=sys.stderr)
+        to_stderr(f"{source.name} in {world}: {said}.")
     for caution in cautions:
-        print(f"Warning: {caution}.", file=sys.stderr)
-    left = log_of(out / runner.file_of(source, world, rendering))
-    if left.is_file() and not resume:
-        print(f"Warning: {left}, of a run that was stopped, is given up; --resume goes on with it.", file=sys.stderr)
-    with step_progress(f"{source.name} in {world}") as runner.progress:
+        to_stderr(f"Warning: {caution}.")
+    left = parts_of(out / runner.file_of(source, world, rendering))
+    if left.is_dir() and not resume:
+        to_stderr(f"Warning: {left}, of a run that was stopped, is given up; --resume goes on with it.")
+    stage = f"{source.name} in {world}: steps"
+    with stage_progress(stage, transient=True) as progress:
+        runner.progress = partial(progress, stage)
         place, streamed = runner.stream(source, world, rendering, resume=resume)
     stopped = "" if streamed is None else streamed.stopped
     with opened_run(place.partial if stopped else place.path) as (result, entry):
         if entry.run_key != place.key:
             raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
         file = place.path if result.complete else place.partial
+        lines = [*describe(result, existed=streamed is None), f"Stored in {file}"]
+        if not result.complete:
+            lines[-1] = f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {file}"
+        if streamed is not None and streamed.resumed_at:
+            lines.insert(0, f"Resumed after {streamed.resumed_at} steps.")
+        elif streamed is not None and resume:
+            lines.insert(0, "Nothing to resume: computed from the start.")
+        if streamed is not None and streamed.resumable:
+            lines.append("Go on with the same command and --resume.")
         status = (130 if stopped == INTERRUPTED else 1) if stopped else DISTRUSTED if result.distrust else 0
-        return Answer(run_as_json(result) | {"warnings": cautions, "file": file},
-                      list(_lines(result, place, streamed, resume)), status)
+        return Answer(run_as_json(result) | {"warnings": cautions, "file": file}, lines, status)
 
 
 def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
     """Return a warning if a rigid world will take long, and whether it refuses the scene; "" for other laws."""
-    if not isinstance(law, RigidConstraints):
+    if not hasattr(law, "cost"):
         return "", False
-    cost, steps = cost_of(System(scene)), scene.steps
+    cost = law.cost(System(scene))
     rows = f"{cost.contacts:,} contacts of {cost.coordinates:,} coordinates in each step"
     if cost.too_large:
         return f"{rows}: more than the rigid worlds take; fewer bodies, or the world IAPB", True
-    if cost.seconds * steps < WORTH_SAYING:
+    if cost.seconds * scene.steps < WORTH_SAYING:
         return "", False
-    return f"{rows}, about {duration(cost.seconds)} a step and {duration(cost.seconds * steps)} in all", False
-
-
-WORTH_SAYING = 60.0  # seconds
-DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
-
-
-def _lines(run: Run, place: Place, streamed: Streamed | None, resume: bool) -> Iterator[str]:
-    if streamed is not None and streamed.resumed_at:
-        yield f"Resumed after {streamed.resumed_at} steps."
-    elif resume and streamed is not None:
-        yield "Nothing to resume: computed from the start."
-    yield from describe(run, existed=streamed is None)
-    if run.complete:
-        yield f"Stored in {place.path}"
-        return
-    yield f"Stopped: {run.stopped}. The {run.steps} steps done are readable in {place.partial}"
-    if streamed is not None and streamed.resumable:
-        yield "Go on with the same command and --resume."
+    return f"{rows}, about {duration(cost.seconds)} a step and {duration(cost.seconds * scene.steps)} in all", False
 
 
 def run_as_json(run: Run) -> dict[str, Any]:
@@ -132,19 +125,14 @@ def deepest(run: Run) -> float:
     return max(0.0, *(-float(block.min(initial=0.0)) for block in blocks(run.contacts.gap)))
 
 
-SHOWN_COORDINATES = 12  # more would not fit into a readable line
-
-
 def describe(run: Run, existed: bool) -> Iterator[str]:
     """Yield a summary of a run in sentences; the arrays may be in memory or in the run's file."""
-    seconds, steps = float(np.sum(run.chunk_seconds)), max(run.steps, 1)
-    how = "read from its file; it had taken" if existed else "computed in"
-    ignored = ignored_fields(run.effects)
+    seconds, impacts, ignored = float(np.sum(run.chunk_seconds)), run.impacts, ignored_fields(run.effects)
     said = f"; ignores {', '.join(ignored)}" if ignored else ""
     yield f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}{said}."
+    how = "read from its file; it had taken" if existed else "computed in"
     yield (f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
-          f"({duration(seconds / steps)} a step).")
-    impacts = run.impacts
+           f"({duration(seconds / max(run.steps, 1))} a step).")
     if len(impacts.step):
         lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
         most = max(int(block.max()) for block in blocks(impacts.rows))
@@ -154,32 +142,11 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
         yield "No collision was resolved by an impulse."
     if len(run.contacts.gap):
         yield f"Deepest penetration {deepest(run) * 1e3:.4g} mm."
-    yield f"At the end: {_end_of(run)}."
-    for remark in run.remarks:
-        if not ("stiffness" in ignored and remark.startswith("chosen for implicit contact")):
-            yield f"{remark}."
+    count, tool = len(run.coordinate_names), range(*run.tool_coordinates)
+    shown = range(count) if count <= SHOWN_COORDINATES else tool or range(SHOWN_COORDINATES)
+    more = f" (and {count - len(shown)} more coordinates in the run's file)" if count > len(shown) else ""
+    yield f"At the end: {', '.join(f'{run.coordinate_names[i]} {run.q[-1, i]:.6g}' for i in shown)}{more}."
+    yield from (f"{remark}." for remark in run.remarks
+                if not ("stiffness" in ignored and remark.startswith("chosen for implicit contact")))
     if run.distrust:
         yield f"This result is not to be trusted, because {'; '.join(run.distrust)}."
-
-
-def _end_of(run: Run) -> str:
-    """Return the last coordinates in words: those of the hand's tool if there are many, else the first ones."""
-    count = len(run.coordinate_names)
-    start, stop = run.tool_coordinates
-    shown = range(count) if count <= SHOWN_COORDINATES else range(start, stop) or range(SHOWN_COORDINATES)
-    words = ", ".join(f"{run.coordinate_names[i]} {run.q[-1, i]:.6g}" for i in shown)
-    more = count - len(shown)
-    return words + (f" (and {more} more coordinates in the run's file)" if more else "")
-
-
-def duration(seconds: float) -> str:
-    """Return a time as text in a suitable unit."""
-    for unit, factor in (("s", 1.0), ("ms", 1e3)):
-        if seconds * factor >= 1.0:
-            return f"{seconds * factor:.3g} {unit}"
-    return f"{seconds * 1e6:.3g} µs"
-
-
-def counted(count: int, noun: str) -> str:
-    """Return a count with its noun: "1 collision", "2 collisions"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

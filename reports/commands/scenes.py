@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from iapb.scene import find_scene, load_scene, scene_names
-from reports.commands.answer import Answer, Json
+from reports.show import Answer, Json
 
 
 def scenes(json_: Json = False) -> Answer:

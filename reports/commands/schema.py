@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 
 from iapb.scene import scene_schema
+from reports.show import Answer
 
 
-def schema() -> None:
+def schema() -> Answer:
     """Print the JSON Schema of scene files (for completion and checks in an editor)."""
-    print(json.dumps(scene_schema(), indent=2))
+    return Answer({}, [json.dumps(scene_schema(), indent=2)])

@@ -7,16 +7,15 @@ from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from iapb.errors import ArgumentError, IapbError
-from reports.commands.answer import Answer, Json
-from reports.commands.progress import stage_progress
 from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
-from reports.resimulate import Repetition, repeat_run
+from reports.resimulate import repeat_run
+from reports.show import Answer, Json, stage_progress
 from reports.store.care import (
     DAMAGED,
     FOREIGN,
@@ -26,11 +25,12 @@ from reports.store.care import (
     collect_garbage,
     garbage,
     is_run,
+    parts_of_killed,
     repair_store,
 )
-from reports.store.logs import is_damaged
+from reports.store.parts import are_damaged, remove_parts
 from reports.store.runs import read_provenance
-from reports.streaming import logs_of_killed, recover
+from reports.streaming import recover
 
 
 class Action(StrEnum):
@@ -65,53 +65,43 @@ def store(
         raise typer.BadParameter("only with the action gc", param_hint="--delete")
     if action is Action.gc:
         return _gc(where, delete)
-    return {Action.check: _check, Action.repair: _repair, Action.again: _again}[action](where)
+    return _again(where) if action is Action.again else _checked(where, action is Action.repair)
 
 
-def _check(where: Path) -> Answer:
+def _listed(states: Sequence[FileState]) -> list[str]:
+    return [f"{state.path}: {state.state}: {state.why}" for state in states if state.state != WHOLE]
+
+
+def _checked(where: Path, repair: bool) -> Answer:
     with stage_progress() as progress:
-        states = check_store(where, partial(progress, "files read whole"))
-    damaged = any(state.state == DAMAGED for state in states)
-    lines = _states(states)
-    if damaged:
-        lines.append(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
-    foreign = where.is_file() and states[0].state == FOREIGN
-    return Answer(_facts(states), lines, 1 if damaged or foreign else 0)
-
-
-def _repair(where: Path) -> Answer:
-    with stage_progress() as progress:
-        states = repair_store(where, partial(progress, "files read whole"))
-    recovered = [line for log in logs_of_killed(where) for line in _recovered(log)]
-    aside = sum(not state.path.exists() for state in states)
-    last = f"{aside} damaged set aside, to be computed again when next asked for."
-    return Answer(_facts(states) | {"logs": recovered, "aside": aside}, [*_states(states), *recovered, last])
-
-
-def _recovered(log: Path) -> Iterator[str]:
-    """Store the complete steps of a log as a readable run, and yield a sentence about it."""
-    try:
-        if not is_live(log):
-            yield f"{recover(log)}: what a killed run did; iapb run --resume goes on"
-            return
-        yield f"{finish_live(log, 'killed')[0]}: what a killed live run did, with its timetable"
-        if is_damaged(log):
-            yield f"{log}: damaged; what is before the damage is in the run, the log is kept"
-        else:
-            log.unlink()
-    except IapbError as error:
-        yield f"{log}: left as it is: {str(error).removeprefix(f'{log}: ')}"
-
-
-def _facts(states: Sequence[FileState]) -> dict[str, Any]:
-    return {"files": states, "count": Counter(state.state for state in states)}
-
-
-def _states(states: Sequence[FileState]) -> list[str]:
+        states = (repair_store if repair else check_store)(where, partial(progress, "files read whole"))
     count = Counter(state.state for state in states)
+    facts = {"files": states, "count": count}
     parts = ", ".join(f"{number} {state}" for state, number in count.most_common())
-    return [*(f"{state.path}: {state.state}: {state.why}" for state in states if state.state != WHOLE),
-            f"{len(states)} files: {parts or 'none'}"]
+    lines = [*_listed(states), f"{len(states)} files: {parts or 'none'}"]
+    if repair:
+        logs = [line for parts in parts_of_killed(where) for line in _recovered(parts)]
+        aside = sum(not state.path.exists() for state in states)
+        lines += [*logs, f"{aside} damaged set aside, to be computed again when next asked for."]
+        return Answer(facts | {"logs": logs, "aside": aside}, lines)
+    if count[DAMAGED]:
+        lines.append(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
+    return Answer(facts, lines, int(bool(count[DAMAGED] or where.is_file() and count[FOREIGN])))
+
+
+def _recovered(parts: Path) -> Iterator[str]:
+    """Store the complete steps in parts as a readable run, and yield a sentence about it."""
+    try:
+        if not is_live(parts):
+            yield f"{recover(parts)}: what a killed run did; iapb run --resume goes on"
+            return
+        yield f"{finish_live(parts, 'killed')[0]}: what a killed live run did, with its timetable"
+        if are_damaged(parts):
+            yield f"{parts}: damaged; what is before the damage is in the run, the parts are kept"
+        else:
+            remove_parts(parts)
+    except IapbError as error:
+        yield f"{parts}: left as they are: {str(error).removeprefix(f'{parts}: ')}"
 
 
 def _gc(where: Path, delete: bool) -> Answer:
@@ -120,36 +110,30 @@ def _gc(where: Path, delete: bool) -> Answer:
     if delete:
         collect_garbage(found)
     return Answer({"files": found, "megabytes": size, "removed": delete}, [
-        *(f"{state.path}: {state.state}: {state.why}" for state in found),
+        *_listed(found),
         f"{len(found)} files, {size:.1f} MB, {'removed' if delete else 'would be removed by --delete'}; results of the "
         "present code, of your own code and all foreign files are kept."])
 
 
 def _again(where: Path) -> Answer:
+    """Simulate the runs again; list what differs, and by how much."""
     files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
-    found: dict[Path, Repetition | str] = {}
+    facts, lines = dict[Path, dict[str, object]](), list[str]()
     with stage_progress() as progress:
         for done, path in enumerate(files):
             progress("runs simulated again", done, len(files))
             try:
-                found[path] = repeat_run(path)
+                found = repeat_run(path)
             except IapbError as error:
-                found[path] = f"not simulated again: {str(error).removeprefix(f'{path}: ')}"
-    same = sum(not isinstance(one, str) and one.same for one in found.values())
-    facts = {"same": same, "files": {path: {"failed": one} if isinstance(one, str) else
-                                     {"same": one.same, "differs": one.differs} for path, one in found.items()}}
-    lines = [line for path, one in found.items() for line in _repeated(path, one)]
-    return Answer(facts, [*lines, f"{same} of {len(files)} runs came out the same."], 1 if same < len(files) else 0)
-
-
-def _repeated(path: Path, found: Repetition | str) -> Iterator[str]:
-    """Yield what differs in a run that was simulated again, and by how much."""
-    if isinstance(found, str):
-        yield f"{path}: {found}"
-        return
-    yield f"{path}: " + ("the same to the last bit" if found.same else "differs in")
-    for one in found.differs:
-        yield f"  {one.name}: {one.how}"
-    made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
-    if not found.same and made != here:
-        yield f"  it was stored under {made}; this is {here}"
+                facts[path] = {"failed": f"not simulated again: {str(error).removeprefix(f'{path}: ')}"}
+                lines.append(f"{path}: {facts[path]['failed']}")
+                continue
+            facts[path] = {"same": found.same, "differs": found.differs}
+            lines.append(f"{path}: {'the same to the last bit' if found.same else 'differs in'}")
+            lines += [f"  {one.name}: {one.how}" for one in found.differs]
+            made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
+            if not found.same and made != here:
+                lines.append(f"  it was stored under {made}; this is {here}")
+    same = sum(bool(one.get("same")) for one in facts.values())
+    return Answer({"same": same, "files": facts}, [*lines, f"{same} of {len(files)} runs came out the same."],
+                  int(same < len(files)))

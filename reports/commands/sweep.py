@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from reports.batches import cluster, processes
-from reports.commands.answer import Answer, Json
-from reports.commands.progress import stage_progress
+from reports.show import Answer, Json, stage_progress
 from reports.sweeps.study import find_study, load_study, scene_of
 from reports.sweeps.sweep import SUMMARY, run_sweep
 
@@ -32,7 +32,7 @@ def sweep(
     who = cluster(scheduler) if scheduler else processes(workers or os.cpu_count() or 1)
     with stage_progress() as progress:
         outcome = run_sweep(chosen, str(scene_of(chosen, path)), out, who,
-                            lambda done, total: progress(f"points of {chosen.name}", done, total))
+                            partial(progress, f"points of {chosen.name}"))
     made, failed = len(outcome.results) - outcome.reused, outcome.failed
     table, runs = out / chosen.name / SUMMARY, out / chosen.name / "runs"
     facts = {"study": chosen.name, "points": outcome.results, "computed": made, "found": outcome.reused,

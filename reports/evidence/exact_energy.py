@@ -2,43 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from iapb import certify
 from iapb.contact.laws import ENGINE_LAWS
+from reports.batches import cores, processes
 from reports.store.runs import read_run
 from verification.check import Check, Study, Topic
-from verification.finding import NOT_TESTABLE, Part, verdict_of_law
+from verification.finding import NOT_TESTABLE, Part, attempt, verdict_of_law
 from verification.impacts import ADVERSE_FAMILIES
 from verification.laws.bulk import exact_energy
 from verification.table import HOLDS, Row, Table
 
 _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
+FEW = 100  # runs that are certified in this process, which is faster than to start others
 _NOTE = ("Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: impacts without any passive step, so v⁺ = v⁻. Energy "
          "cost: the loss at e = 1 beyond that of the same impact without clamp, in units of 10 d ε √κ(M).")
 
 
-def _certified(study: Study, name: str) -> Iterable[Row]:
-    """Yield the row of a run; none if the run's law is not the engine's or the run has no impact.
+def _certified(study: Study, name: str) -> list[Row]:
+    folder = study.run.store.folder  # type: ignore[attr-defined]
+    return study.once(name, lambda: _rows(folder, name))
+
+
+def _rows(folder: Path, name: str) -> list[Row]:
+    """Return the row of a run; none if the run's law is not the engine's or the run has no impact.
 
     Rigid worlds are left out: they solve for the impulses and forces of a step together and record no separate impact.
     """
-    run = read_run(study.run.store.folder / name)  # type: ignore[attr-defined]
-    if run.law in ENGINE_LAWS and len(run.impacts.step):
-        one = certify(run)
-        yield {"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains,
-               "largest gain": one.largest_gain, "M Δv − impulse": _known(one.momentum),
-               "Jᵀp − impulse": _known(one.span), "restitution": _known(one.restitution), HOLDS: one.passed}
+    run = read_run(folder / name)
+    if run.law not in ENGINE_LAWS or not len(run.impacts.step):
+        return []
+    one = certify(run)
+    return [{"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains,
+             "largest gain": one.largest_gain, "M Δv − impulse": _known(one.momentum),
+             "Jᵀp − impulse": _known(one.span), "restitution": _known(one.restitution), HOLDS: one.passed}]
 
 
-def _drawn(study: Study, family: str) -> Row:
-    one = exact_energy(family, _DRAWN[study.depth])
-    return {"family": family, "impacts": one.impacts, "gains": one.gains, "moved": one.moved,
-            "cancelled": one.cancelled, "median energy cost": _known(one.price[0]),
-            "largest energy cost": _known(one.price[2]), HOLDS: one.holds}  # fmt: skip
+def _certify_beside(study: Study, names: Sequence[str]) -> None:
+    """Certify many runs in processes; what raises there is tried again, and named, by `_certified`."""
+    if len(names) > FEW:
+        rows = partial(attempted, partial(_rows, study.run.store.folder))  # type: ignore[attr-defined]
+        found = processes(cores())(rows, names)
+        study.results.update((name, given) for name, given in found if given is not None)
+
+
+def attempted(compute: Callable[[Any], Any], part: Any) -> Any:
+    """Return the result of a part, or None if it raises."""
+    return attempt("", partial(compute, part), [])
 
 
 def _known(value: float) -> float | None:
@@ -86,8 +102,10 @@ def _runs(study: Study) -> Any:
 TOPIC = Topic(
     key="exact-energy", title="Exact energy", question="Does any impact gain energy, even in the last bit?",
     checks=(
-        Check(key="certified runs", question="", cases=_runs, row=_certified, says=_recorded_says),
-        Check(key="adverse impacts", question="", cases=lambda study: ADVERSE_FAMILIES, row=_drawn, says=_drawn_says,
+        Check(key="certified runs", question="", cases=_runs, prepare=_certify_beside, row=_certified,
+              says=_recorded_says),
+        Check(key="adverse impacts", question="", cases=lambda study: ADVERSE_FAMILIES,
+              row=lambda study, family: exact_energy(family, _DRAWN[study.depth]), says=_drawn_says,
               rule=verdict_of_families, note=_NOTE),
     ),
     says=_answer,

@@ -3,36 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
+from contextlib import suppress
 from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from reports.evidence import claims, runs
+from iapb.errors import IapbError
+from reports import batches
+from reports.evidence import runs
 from reports.evidence.depends import depends_of
-from reports.evidence.stage import Stage, evidence_version
-from reports.evidence.topics import TOPICS, compute_topic, failed_topic
-from reports.figures.two_link_arm import arm_energies
+from reports.evidence.stage import Stage
+from reports.evidence.topics import CLAIM_STAGES, TOPICS, failed_topic, plans
+from reports.figures.paper import arm_energies
 from reports.pages.records import Evidence, FailedCases, StoredFile
-from reports.provenance import PEERS, collect_provenance, machine_of
+from reports.provenance import PEERS, collect_provenance, this_machine
 from reports.runner import Runner
 from reports.store.io import opened
-from reports.store.runs import read_provenance
-from reports.uses import UsedRun
+from reports.store.keys import evidence_version
+from reports.uses import UsedRun, add_use
 from verification import haptic_rate
 from verification.cost import effects
-from verification.cost.impacts import work_precision
 from verification.finding import Failure, Finding, attempt
-from verification.hard_cases import study as hard_cases
-from verification.laws import topic as laws
-from verification.proofs import check_all, on_proofs
-from verification.proofs.coq_development import Theorem, theorems
-from verification.proofs.show import ProofRecord
-from verification.table import Table
+from verification.hard_cases.study import on_hard_cases
+from verification.proofs import on_proofs
 
 Progress = Callable[[str, int, int], None]
-Compute = Callable[[Callable[[int, int], None], list[Failure]], Any]  # progress, and a list for cases that raise
 
 # study that draws random numbers -> module with its SEED
 SEEDS = {
@@ -44,63 +42,117 @@ SEEDS = {
 ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since
 UNNAMED = "the report"  # the user of a run that no claim, topic or figure requested
 SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link_arm_b", "arm_pushing")
+FIGURE_RUNS = "runs of the figures"
+CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
+# The first stages to be computed: the figures' runs compile the engine, proofs need no engine, claims take longest.
+FIRST = ("Coq development", "proofs", "claims on the peg", "claims")
+PAUSE = 0.2  # [s] between two looks at what the workers say
 
 
 def gather(out: Path, depth: str, progress: Progress) -> Evidence:
-    """Compute or read everything that the report shows; runs/ and tables/ are written in `out`."""
-    runner = Runner(out / "runs")
-    kept = _Kept(out / "tables", depth, progress, runner)
-    scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
-    inputs: dict[str, Any] = kept.attempt("runs of the figures", partial(runs.figure_runs, runner), {})
-    inputs |= {f"scene/{name}": scene for name, scene in scenes.items()}
-    inputs["arm_energies"] = arm_energies()
+    """Compute or read everything that the report shows; runs/ and tables/ are written in `out`.
 
-    ledger = kept.stage("claims", tuple[Finding, ...], partial(claims.compute, runner, depth, workers=claims.cores()))
-    proved = kept.stage("proofs", tuple[ProofRecord, ...], check_all)
-    in_coq = kept.stage("Coq development", tuple[Theorem, ...], theorems)
-    broken = kept.stage("counterexamples", tuple[Finding, ...], laws.counterexamples)
-    hard = kept.stage("hard cases", tuple[Finding, ...], partial(hard_cases.hard_cases, runner))
-    timed = kept.stage("accuracy", Table, lambda done, lost: work_precision(progress=done, failures=lost), None)
-    gains, properties, *others = (_topic(kept, name, runner, depth) for name in TOPICS)
-    topics = (gains, kept.finding("proofs", proved, partial(on_proofs, development=in_coq)), properties,
-              kept.finding("hard cases", hard, hard_cases.on_hard_cases), *others)  # fmt: skip
-    topics = tuple(haptic_rate.quoting(topic, (*ledger, *topics)) if topic.key == haptic_rate.TOPIC.key else topic
-                   for topic in topics)
-    if kept.failures["claims"] and not ledger:
-        topics = (failed_topic("claims", kept.failures["claims"][0]), *topics)
-    inputs["work_precision"] = timed
-    facts = provenance()
-    needed = kept.stage("effects", dict[str, Table], effects.effects_of_scenes, {})
+    First the stages that measure no time are computed beside each other, in processes; then all others, one after the
+    other, in this process.
+    """
+    runner = Runner(out / "runs")
+    stages = {name: Stage(out / "tables", name, plan.kind, depth, depends_of(name)) for name, plan in plans().items()}
+    _compute_beside(stages, out, depth, progress)
+    lost: list[Failure] = []
+    read = attempt("all of it", partial(runs.figure_runs, runner, partial(progress, FIGURE_RUNS), lost), lost)
+    for stage in stages.values():
+        _fill(stage, runner, depth, progress)
+
+    def finding(name: str, said: Callable[..., Finding]) -> Finding:
+        stage = stages[name]
+        return said(stage.records or (), stage.failures) if stage.records or not stage.failures else _failed(stage)
+
+    ledger = tuple(sorted((claim for name in CLAIM_STAGES for claim in stages[name].records or ()),
+                          key=lambda claim: claim.key))  # fmt: skip
+    gains, properties, *others = (stages[name].records or _failed(stages[name]) for name in TOPICS)
+    topics = [gains, finding("proofs", partial(on_proofs, development=stages["Coq development"].records or ())),
+              properties, finding("hard cases", on_hard_cases), *others]  # fmt: skip
+    topics = [haptic_rate.quoting(topic, (*ledger, *topics)) if topic.key == haptic_rate.TOPIC.key else topic
+              for topic in topics]  # fmt: skip
+    topics = [_failed(stages[name]) for name in CLAIM_STAGES
+              if stages[name].records is None] + topics  # fmt: skip
+    scenes, facts = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}, provenance()
+    needed = stages["effects"].records or {}
     shown = {name: needed[name] for name in effects.SCENES if name in needed}
-    inputs |= {"effect_costs": effects.summary(shown), "effect_steps": effects.steps(needed),
-               "machine": "{cpu}, report of {date}".format_map(facts)}
+    inputs = {**(read or {}), **{f"scene/{name}": scene for name, scene in scenes.items()},
+              "arm_energies": arm_energies(), "work_precision": stages["accuracy"].records,
+              "effect_costs": effects.summary(shown), "effect_steps": effects.steps(needed),
+              "machine": "{cpu}, report of {date}".format_map(facts)}  # fmt: skip
+    failed = failed_cases(out / "tables", {FIGURE_RUNS: lost} | {one.name: one.failures for one in stages.values()})
     return Evidence(
-        inputs=inputs, scenes=scenes, claims=ledger, proofs=proved, counterexamples=broken, hard_cases=hard,
-        effects=shown, topics=topics, failed=kept.failed(), provenance=facts,
-        manifest=manifest(runner.used, kept.stages, out),
+        inputs=inputs, scenes=scenes, claims=ledger, proofs=stages["proofs"].records or (),
+        counterexamples=stages["counterexamples"].records or (), hard_cases=stages["hard cases"].records or (),
+        effects=shown, topics=tuple(topics), failed=failed, provenance=facts,
+        manifest=manifest(runner.used, stages.values(), out),
+        seconds={stage.name: stage.seconds for stage in stages.values()},
     )  # fmt: skip
 
 
-def _topic(kept: _Kept, name: str, runner: Runner, depth: str) -> Finding:
-    """Return a topic, or a substitute that says why the topic could not be computed."""
-    topic: Finding | None = kept.stage(name, Finding, lambda done, _: compute_topic(name, runner, depth, done), None)
-    return failed_topic(name, kept.failures[name][-1]) if topic is None else topic
+def _failed(stage: Stage) -> Finding:
+    return failed_topic(stage.name, stage.failures[-1])
+
+
+def _fill(stage: Stage, runner: Runner, depth: str, progress: Progress) -> Stage:
+    """Read or compute the records of a stage, unless it has been done."""
+    plan, said = plans()[stage.name], partial(progress, stage.name)
+    if stage.records is None and not stage.failures:
+        stage.fill(runner, lambda failures: plan.compute(runner, depth, said, failures))
+        said(1, 1)
+    for run in stage.runs.values():
+        add_use(runner.used, run)
+    return stage
+
+
+def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: Progress) -> None:
+    """Compute the missing stages that measure no time, each in a process, and put them into `stages`.
+
+    If a worker is killed because memory ran out, its stage stays missing; it is computed alone after that.
+    """
+    order = sorted(stages, key=lambda name: FIRST.index(name) if name in FIRST else len(FIRST))
+    ahead = [name for name in order
+             if not (plans()[name].timed or name == CERTIFIED or stages[name].path.is_file())]  # fmt: skip
+    if not ahead:
+        return
+    with suppress(IapbError), batches.worker_pool(batches.cores()) as pool:
+        running = {pool.submit(_figure_runs, out)} | {pool.submit(_filled, stages[name], out, depth) for name in ahead}
+        while running:
+            done, running = wait(running, PAUSE, FIRST_COMPLETED)
+            stages |= {stage.name: stage for future in done if isinstance(stage := future.result(), Stage)}
+            while not pool.said.empty():
+                progress(*pool.said.get())
+
+
+def _figure_runs(out: Path) -> Stage | None:
+    """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those that fail."""
+    runs.figure_runs(Runner(out / "runs"), partial(_tell, FIGURE_RUNS), [])
+    return None
+
+
+def _filled(stage: Stage, out: Path, depth: str) -> Stage | None:
+    """Return a stage with its records, in a worker."""
+    return _fill(stage, Runner(out / "runs"), depth, _tell)
+
+
+def _tell(*said: Any) -> None:
+    batches.tell_parent(said)
 
 
 def manifest(used: Mapping[str, UsedRun], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:
     """Return one line per used run file and per table file, in the order of use; paths are relative to `out`."""
-    files = []
-    for run in used.values():
-        path, users = out / "runs" / run.file, run.used_by or (UNNAMED,)
-        status, made_on = (run.status, machine_of(read_provenance(path))) if path.is_file() else (ABSENT, "")
-        files.append(StoredFile(run.name, f"runs/{run.file}", run.key, run.content_hash, run.command, run.size, users,
-                                status, made_on))  # fmt: skip
+    files = [StoredFile(run.name, f"runs/{run.file}", run.key, run.content_hash, run.command, run.size,
+                        run.used_by or (UNNAMED,), run.status if (out / "runs" / run.file).is_file() else ABSENT,
+                        run.made_on) for run in used.values()]  # fmt: skip
     for stage in stages:
-        with opened(stage.path, expected_format=None) as file:
-            content = str(file.attrs["content_hash"])
-        place, name = stage.path.relative_to(out).as_posix(), stage.name.replace("_", " ")
-        files.append(StoredFile(name, place, stage.key, content, "iapb reproduce", stage.path.stat().st_size,
-                                made_on=machine_of(read_provenance(stage.path))))  # fmt: skip
+        if stage.path.is_file():
+            with opened(stage.path, expected_format=None) as file:
+                content = str(file.attrs["content_hash"])
+            files.append(StoredFile(stage.name, stage.path.relative_to(out).as_posix(), stage.key, content,
+                                    "iapb reproduce", stage.path.stat().st_size, made_on=this_machine()))  # fmt: skip
     return tuple(files)
 
 
@@ -111,54 +163,14 @@ def provenance() -> dict[str, str]:
     return {"date": datetime.now(UTC).date().isoformat()} | facts | {"sources": evidence_version()}
 
 
-class _Kept:
-    """The stages of one folder and depth, in the order in which they were requested, and the cases that failed."""
-
-    def __init__(self, folder: Path, depth: str, progress: Progress, runner: Runner) -> None:
-        self.folder, self.depth, self.progress, self.runner = folder, depth, progress, runner
-        self.stages: list[Stage] = []
-        self.failures: dict[str, list[Failure]] = {}
-
-    def stage(self, name: str, kind: Any, compute: Compute, nothing: Any = ()) -> Any:
-        """Return the records of a stage, stored or computed now; `nothing` if the stage cannot be computed at all."""
-        stage = Stage(self.folder, name.replace(" ", "_"), kind, {"depth": self.depth}, depends_of(name))
-        self.failures[name] = stage.failures
-
-        def records(progress: Callable[[int, int], None], failures: list[Failure]) -> Any:
-            found = stage.get_or_compute(lambda: compute(progress, failures), self.runner)
-            self.stages.append(stage)
-            return found
-
-        return self.attempt(name, records, nothing)
-
-    def finding(self, name: str, records: Sequence[Any], said: Callable[[Any, list[Failure]], Finding]) -> Finding:
-        """Return the finding on the records of a stage; without records, return one that says why there are none."""
-        failures = self.failures[name]
-        return said(records, failures) if records or not failures else failed_topic(name, failures[0])
-
-    def attempt(self, name: str, compute: Compute, nothing: Any) -> Any:
-        """Return the result of `compute`, or `nothing` if it raises; KeyboardInterrupt is not caught."""
-        failures = self.failures.setdefault(name, [])
-        started = len(failures)
-        found = attempt("all of it", lambda: compute(lambda *done: self.progress(name, *done), failures), failures)
-        self.progress(name, 1, 1)
-        return nothing if found is None and len(failures) > started else found
-
-    def failed(self) -> tuple[FailedCases, ...]:
-        """Return the failed cases of each stage, and write their tracebacks to a file beside the tables."""
-        return tuple(case for name, failures in self.failures.items()
-                     for case in failed_cases(self.folder, name, failures))  # fmt: skip
-
-
-def failed_cases(folder: Path, name: str, failures: Sequence[Failure]) -> tuple[FailedCases, ...]:
-    """Write the tracebacks of the failures of stage `name` to a file in `folder`, replacing an older file.
-
-    Return the failed cases with that file; without failures, return () and leave no file.
-    """
-    path = folder / f"{name.replace(' ', '_')}-failed.txt"
-    path.unlink(missing_ok=True)
-    if not failures:
-        return ()
-    folder.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(f"{one.case}\n{one.traceback}" for one in failures), encoding="utf-8")
-    return (FailedCases(name, tuple(failures), str(path)),)
+def failed_cases(folder: Path, failures: Mapping[str, Sequence[Failure]]) -> tuple[FailedCases, ...]:
+    """Return the failed cases of each stage; write their tracebacks to a file in `folder`, or remove an older file."""
+    found = []
+    for name, lost in failures.items():
+        path = folder / f"{name.replace(' ', '_')}-failed.txt"
+        path.unlink(missing_ok=True)
+        if lost:
+            folder.mkdir(parents=True, exist_ok=True)
+            path.write_text("\n".join(f"{one.case}\n{one.traceback}" for one in lost), encoding="utf-8")
+            found.append(FailedCases(name, tuple(lost), str(path)))
+    return tuple(found)

@@ -1,17 +1,18 @@
 """A stage of the evidence: records that are computed once and then read from their file.
 
 The file holds the records, and the runs behind them, as JSON text. Its name contains a hash of what determines the
-records: the stage's inputs, the sources of the engine, the references and the verification, the scenes, the processor,
-the BLAS kernel and the optional code of numpy, and the declared external dependencies. If any of them changes, the
-stage is computed again; a change of the report's own code does not cause that. Because the machine is part of the hash,
-numbers of two machines are never mixed.
+records: the depth, the sources of the engine, the references and the verification, the scenes, the processor, the BLAS
+kernel and the optional code of numpy, and the declared external dependencies. If any of them changes, the stage is
+computed again; a change of the report's own code does not cause that. Because the machine is part of the hash, numbers
+of two machines are never mixed.
 """
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,69 +21,80 @@ from reports.runner import Runner
 from reports.store.io import mark_store
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
 from reports.store.tables import read_record, write_record
-from reports.uses import UsedRun, add_use
-from verification.finding import Failure
+from reports.uses import UsedRun
+from verification.finding import Failure, attempt
 
-_LAYOUT = 3  # of the files: 2 had the rows of tables as columns
+_LAYOUT = 4  # of the files: 3 did not say where runs were made
 
 
 class Stage:
-    """The file that stores the records of one topic.
+    """The records of one stage, and their file.
 
     Parameters
     ----------
     folder : folder of the table files.
-    name : name of the topic; the file's name starts with it.
+    name : name of the stage; the file's name starts with it.
     kind : the type of the records, such as ``tuple[Claim, ...]``.
-    inputs : what determines the records besides the code.
+    depth : "quick" or "full".
     depends : external dependencies of the records by name, such as files outside of the project.
 
     Attributes
     ----------
-    runs : the runs that the records were made from, by file; empty until the records are computed or read.
+    records : None until the stage is filled, and if it cannot be.
+    runs : the runs that the records were made from, by file.
     failures : the cases that raised. If there are any, the records are written to a file named "incomplete", which
         later calls do not read, so that they compute the stage again.
+    seconds : the time that it took to compute or read the records.
     """
 
     def __init__(
-        self, folder: Path, name: str, kind: Any, inputs: Mapping[str, Any], depends: Mapping[str, str] | None = None
+        self, folder: Path, name: str, kind: Any, depth: str, depends: Mapping[str, str] | None = None
     ) -> None:
-        given = {"stage": name, "layout": _LAYOUT, "inputs": inputs, "code": evidence_version(),
-                 "depends": depends or {}, "machine": this_machine()}  # fmt: skip
-        self.key = hash_of(given)
-        self.name = name
-        self.path = folder / f"{name}-{self.key[:16]}.h5"
+        word = name.replace(" ", "_")
+        self.key = hash_of({"stage": word, "layout": _LAYOUT, "inputs": {"depth": depth}, "code": evidence_version(),
+                            "depends": depends or {}, "machine": this_machine()})  # fmt: skip
+        self.name, self.kind = name, kind
+        self.path = folder / f"{word}-{self.key[:16]}.h5"
+        self.records: Any = None
         self.runs: dict[str, UsedRun] = {}
         self.failures: list[Failure] = []
-        self._kind = kind
+        self.seconds = 0.0
 
-    def get_or_compute(self, compute: Callable[[], Any], runner: Runner | None = None) -> Any:
-        """Return the records: read them from the file if it exists, else compute and write them.
+    def fill(self, runner: Runner, compute: Callable[[list[Failure]], Any]) -> Stage:
+        """Read the records from their file if it exists, else compute and write them; return the stage.
 
-        The file also lists the runs that `compute` requested from `runner`; they count as used whenever it is read.
+        The runs that `compute` requests from `runner` are kept with the records. Exceptions are recorded as failures;
+        KeyboardInterrupt is not caught.
         """
-        from pydantic import TypeAdapter
+        started = time.perf_counter()
+        fill = self._read if self.path.is_file() else partial(self._compute, runner, compute)
+        attempt("all of it", fill, self.failures)
+        self.seconds = time.perf_counter() - started
+        return self
 
-        adapter = TypeAdapter(self._kind)
-        if self.path.is_file():
-            content = read_record(self.path)
-            self.runs = {run["file"]: UsedRun(**run | {"used_by": tuple(run["used_by"])}) for run in content["runs"]}
-            if runner is not None:
-                for run in self.runs.values():
-                    add_use(runner.used, run)
-            return adapter.validate_python(content["records"])
-        recording = runner.recording(self.name.replace("_", " ")) if runner is not None else nullcontext(self.runs)
-        with recording as used:
-            records = compute()
-        self.runs = dict(used)
-        content = {"runs": list(self.runs.values()), "records": plain(records)}
-        read_back = adapter.validate_python(json.loads(json.dumps(content["records"])))  # raises for a wrong record
-        self.failures += getattr(records, "failures", ())
+    def _read(self) -> None:
+        content = read_record(self.path)
+        self.runs = {run["file"]: UsedRun(**run | {"used_by": tuple(run["used_by"])}) for run in content["runs"]}
+        self.records = self._checked(content["records"])
+
+    def _compute(self, runner: Runner, compute: Callable[[list[Failure]], Any]) -> None:
+        with runner.recording(self.name) as used:
+            computed = compute(self.failures)
+        records = plain(computed)
+        found = self._checked(json.loads(json.dumps(records)))
+        self.failures += getattr(computed, "failures", ())
         incomplete = self.path.with_name(f"{self.path.stem}-incomplete.h5")
         incomplete.unlink(missing_ok=True)
         if self.failures:
             self.path = incomplete
         mark_store(self.path.parent)
-        write_record(self.path, content, f"Records of the stage {self.name}", runs=tuple(self.runs),
-                     command="iapb reproduce", provenance=collect_provenance() | {SOURCES: evidence_version()})
-        return read_back
+        write_record(self.path, {"runs": list(used.values()), "records": records}, f"Records of the stage {self.name}",
+                     runs=tuple(used), command="iapb reproduce",
+                     provenance=collect_provenance() | {SOURCES: evidence_version()})  # fmt: skip
+        self.records, self.runs = found, dict(used)
+
+    def _checked(self, records: Any) -> Any:
+        """Return the records made of JSON; raise if they are not of the stage's type."""
+        from pydantic import TypeAdapter
+
+        return TypeAdapter(self.kind).validate_python(records)

@@ -1,14 +1,29 @@
-"""The topics of the report in reading order: each is one line here, a `Topic` or a function (run, depth, progress)."""
+"""The stages of the evidence in reading order, and the topics of the report: each is one line here."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
+from typing import Any
 
 from reports.runner import Runner
+from verification import claims
+from verification.claims import peg
+from verification.cost.effects import effects_of_scenes
+from verification.cost.impacts import work_precision
 from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_of
+from verification.hard_cases.study import hard_cases
+from verification.laws.topic import counterexamples
+from verification.proofs import check_all
+from verification.proofs.coq_development import Theorem, theorems
+from verification.proofs.show import ProofRecord
+from verification.table import Table
 
-# key of the finding -> module and name of its topic
+Progress = Callable[[int, int], None]
+
+# key of the finding -> module and name of its topic: a `Topic`, or a function (run, depth, progress)
 TOPICS: dict[str, str] = {
     "energy-gains": "verification.laws.topic:energy_gains",
     "properties": "verification.laws.topic:properties",
@@ -23,11 +38,15 @@ TOPICS: dict[str, str] = {
 }
 
 
-def compute_topic(name: str, runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
+def compute_topic(name: str, runner: Runner, depth: str, progress: Progress) -> Finding:
     """Compute one topic."""
-    module, function = TOPICS[name].split(":")
-    topic: Finding = getattr(import_module(module), function)(runner, depth, progress)
+    topic: Finding = _topic(name)(runner, depth, progress)
     return topic
+
+
+def _topic(name: str) -> Any:
+    module, topic = TOPICS[name].split(":")
+    return getattr(import_module(module), topic)
 
 
 def failed_topic(name: str, failure: Failure) -> Finding:
@@ -35,3 +54,62 @@ def failed_topic(name: str, failure: Failure) -> Finding:
     sentence = f"Not computed, after {failure.error}: {failure.reason}."
     key, title = name.replace(" ", "-"), name.replace("-", " ").capitalize()
     return finding_of(key, title, "", sentence, (Part(sentence, NOT_COMPUTED),))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a stage is computed: the type of its records, and (runner, depth, progress, failures) -> records.
+
+    timed : True if the stage measures times, so that nothing may run beside it
+    """
+
+    kind: Any
+    compute: Callable[[Runner, str, Progress, list[Failure]], Any]
+    timed: bool = False
+
+
+CLAIM_STAGES = ("claims", "claims on the peg", "claims on times")
+
+
+def stage_of(claim: str) -> str:
+    """Return the stage that checks a claim; those on the peg share runs, and take as long as all others together."""
+    if claims.CLAIMS[claim].timed:
+        return "claims on times"
+    return "claims on the peg" if hasattr(peg, claim) else "claims"
+
+
+def checked_claims(
+    stage: str, runner: Runner, depth: str, progress: Progress, failures: list[Failure]
+) -> tuple[Finding, ...]:
+    """Check the claims of a stage, with runs from the store; each claim lists the runs that it uses."""
+    def begin(done: int, total: int, claim: str) -> None:
+        runner.user = claim
+        progress(done, total)
+
+    ids = [claim for claim in claims.CLAIMS if stage_of(claim) == stage]
+    found = claims.check_claims(partial(runner, keep=False), depth, ids, progress=begin, asked=runner.use_again)
+    failures += [replace(one, case=f"{claim.key}, {one.case}") if one.case != claim.key else one
+                 for claim in found for one in claim.failures]  # fmt: skip
+    return found
+
+
+def _plan(name: str) -> Plan:
+    """Return the plan of a topic; it is timed if one of its checks has a column of times."""
+    timed = any(check.timed for check in getattr(_topic(name), "checks", ()))
+    return Plan(Finding, lambda runner, depth, progress, failures: compute_topic(name, runner, depth, progress), timed)
+
+
+def plans() -> dict[str, Plan]:
+    """Return the plan of every stage by name."""
+    return {
+        **{stage: Plan(tuple[Finding, ...], partial(checked_claims, stage), stage == "claims on times")
+           for stage in CLAIM_STAGES},
+        "proofs": Plan(tuple[ProofRecord, ...], lambda *given: check_all(*given[2:])),
+        "Coq development": Plan(tuple[Theorem, ...], lambda *given: theorems(*given[2:])),
+        "counterexamples": Plan(tuple[Finding, ...], lambda *given: counterexamples(*given[2:])),
+        "hard cases": Plan(tuple[Finding, ...], lambda runner, _, *given: hard_cases(runner, *given), timed=True),
+        "accuracy": Plan(Table, lambda runner, depth, progress, failures: work_precision(
+            progress=progress, failures=failures), timed=True),
+        **{name: _plan(name) for name in TOPICS},
+        "effects": Plan(dict[str, Table], lambda *given: effects_of_scenes(*given[2:]), timed=True),
+    }  # fmt: skip

@@ -29,15 +29,7 @@ _BORDER = ("cosine", "speed ratio", "agreement predicted", "agreement found")
 _SIZES = {0.0: 3.4, 0.5: 4.6, 1.0: 5.8}  # marker by restitution
 
 
-@recipe(
-    "agreement-map", "Where IAPB and complementarity move alike", "complementarity/map", "complementarity/two contacts",
-    section="complementarity",
-    caption="First picture: one row for each family of impacts and number of redundant rows. The blue bar is the share "
-    "of impacts in which both laws give the same velocity; the ticks for e = 0, 0.5 and 1 coincide. Second picture: "
-    "distance between the laws in the other impacts, median and largest, for e = 0, 0.5 and 1; it is proportional to "
-    "1 + e. Third picture: two contacts with approach speeds 1 and r, whose rows have the cosine c in the kinetic "
-    "metric. The laws agree on and above the line r = c, and nowhere below.",
-)  # fmt: skip
+@recipe("agreement-map", "complementarity/map", "complementarity/two contacts")
 def agreement_map(numbers: Table, border: Table) -> Drawn:
     """Draw the share of impacts that agree, the distance in the other impacts, and the border r = c of two contacts."""
     rows = [row for row in numbers.records() if not row["impacts"].startswith("scene ")]
@@ -82,30 +74,29 @@ def agreement_map(numbers: Table, border: Table) -> Drawn:
         Panel(plot.svg, f"Agreement of two contacts is as predicted by r >= c at {right} of {len(border.rows)} points.",
               "two contacts"),
     )  # fmt: skip
-    legend = (("agree", OUTCOMES["holds"]), ("differ", OUTCOMES["fails"]), ("r = c", BOUND))
-    return Drawn(panels, numbers, legend)
+    return Drawn(panels, numbers, {"agree": OUTCOMES["holds"], "differ": OUTCOMES["fails"], "r = c": BOUND})
 
 
 _AGREE = 1e-11  # of |v⁻|: motions closer than this are equal
 _COUNTS = (5, 10, 20, 50, 100, 200)  # ticks
 
 
-@recipe("where-to-stop", "Where to stop using (19): dense piles", "complementarity/piles", section="hero", caption="")
+@recipe("where-to-stop", "complementarity/piles")
 def where_to_stop(numbers: Table) -> Drawn:
     """Draw the distance from complementarity over contacts and redundancy, and the time of impulses that only push."""
     rows = [row | {"redundant share": row["redundant"] / row["contacts"],
                    "distance": max(row["median distance from the LCP"], _AGREE),
                    "price": row["time of pushing"] / row["time of (21)"]} for row in numbers.records()]  # fmt: skip
-    looks = looks_of(f"contacts that are {given}" for given in dict.fromkeys(numbers.column("rows")))
+    looks = looks_of(f"contacts that are {given}" for given in numbers.column("rows"))
     limit = max(row["most contacts that agree"] for row in rows)
-    price = [row["price"] for row in rows]
+    least, most = (f"{end(row['price'] for row in rows):.2g}" for end in (min, max))
     panels = []
     for x, y, alt, label in (
         ("contacts", "distance", f"No pile of more than {limit} contacts agrees.",
          "distance over the number of contacts"),
         ("redundant share", "distance", "Distance over the share of redundant contacts.",
          "distance over the share that is redundant"),
-        ("contacts", "price", f"Pushing takes {min(price):.2g} to {max(price):.2g} times as long as (21).",
+        ("contacts", "price", f"Pushing takes {least} to {most} times as long as (21).",
          "price of impulses that only push"),
     ):  # fmt: skip
         with Plot(f"where-to-stop-{'price' if y == 'price' else x.replace(' ', '-')}") as plot:
@@ -123,15 +114,9 @@ def where_to_stop(numbers: Table) -> Drawn:
             if (x, y) == ("contacts", "distance"):
                 plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
         panels.append(Panel(plot.svg, alt, label))
-    caption = (
-        "A pile of spheres falls on the floor. Each mark is one kind of pile, in which either all approaching or all "
-        "touching contacts are equalities (19). Marks at the lower edge agree with complementarity to rounding. Do not "
-        f"use (19) where more than {limit} contacts collide at once: its velocity then always differs from that of "
-        "complementarity, and some of its impulses pull. In the world IAPB-push (method “poisson”) impulses only push. "
-        f"It agrees with complementarity to {max(row['pushing from the LCP'] for row in rows):.0e} and takes "
-        f"{min(price):.2g} to {max(price):.2g} times the time of (21), called from Python."
-    )
-    return Drawn(tuple(panels), numbers, (*looks.items(), ("stop here", BOUND)), caption)
+    pushed = max(row["pushing from the LCP"] for row in rows)
+    return Drawn(panels, numbers, looks | {"stop here": BOUND},
+                 {"limit": limit, "pushed": pushed, "least": least, "most": most})
 
 
 # At most six curves; the table has all solvers. In the table, "IAPB" is the engine called from Python.
@@ -142,15 +127,7 @@ TIMED = {
 }
 
 
-@recipe(
-    "cost-of-contacts", "What an impact costs", "complementarity/time per impact", "complementarity/time per step",
-    section="complementarity",
-    caption="Median time of one impact over its number of contacts; the band reaches from the least to the largest "
-    "sample. Compare full lines (compiled) with full lines and dashed lines (called from Python) with dashed lines. A "
-    "cross: the solver's answer was wrong. A triangle at the top: the solver was left out because it was too slow for "
-    "fewer contacts. On a patch all contacts beyond three are redundant, and IAPB drops them; in a pile none is. Last "
-    "picture: time of one step of each world.",
-)  # fmt: skip
+@recipe("cost-of-contacts", "complementarity/time per impact", "complementarity/time per step")
 def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
     """Draw a panel for each family of impacts, and one for the time of a step."""
     solvers = sorted(dict.fromkeys(numbers.column("solver")), key=lambda name: name not in TIMED)[: len(TIMED)]
@@ -164,20 +141,17 @@ def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
             for name, style in styles.items():
                 mine = [row for row in rows if row["solver"] == name]
                 timed = [row for row in mine if row["median"] is not None]
-                at = [row["contacts"] for row in timed]
+                at, wrong = [row["contacts"] for row in timed], [row for row in timed if row["outcome"] == "failed"]
                 if len(at) > 1:
                     plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
                                            color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
                 plot.axes.plot(at, [row["median"] for row in timed], **line_arguments(style))
-                for row in mine:
-                    if row["median"] is None:  # not run
-                        plot.axes.plot(row["contacts"], top, "^", color=style.color, markersize=6, zorder=5)
-                    elif row["outcome"] == "failed":
-                        plot.axes.plot(row["contacts"], row["median"], "x", color=style.color, markersize=10,
-                                       markeredgewidth=1.8, zorder=5)  # fmt: skip
+                plot.axes.plot([row["contacts"] for row in wrong], [row["median"] for row in wrong], "x",
+                               color=style.color, markersize=10, markeredgewidth=1.8, zorder=5)
+                left_out = [row["contacts"] for row in mine if row["median"] is None]
+                plot.axes.plot(left_out, [top] * len(left_out), "^", color=style.color, markersize=6, zorder=5)
             plot.log("contacts", "time of one impact [µs]")
-            contacts = sorted({row["contacts"] for row in rows})
-            plot.axes.set_xticks(contacts, [str(count) for count in contacts])
+            plot.ticks("x", sorted({row["contacts"] for row in rows}))
         words = ", ".join(f"{row['solver']} {row['median']:.3g}" for row in rows
                           if row["contacts"] == most and row["median"] is not None)  # fmt: skip
         alt = f"Median times of a {family} of {most} contacts in microseconds: {words}."
@@ -196,60 +170,41 @@ def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
     words = ", ".join(f"{row['scene']} {row['world']} {row['median']:.3g}" for row in steps.records())
     panels.append(Panel(plot.svg, f"Median times of one step, in times IAPB's compiled: {words}.",
                         "one step of a world"))
-    return Drawn(tuple(panels), numbers, tuple((look.name, look) for look in styles.values()))
+    return Drawn(panels, numbers, {look.name: look for look in styles.values()})
 
 
-@recipe(
-    "performance-profile", "Which solver solves what, and how fast", "complementarity/profile",
-    section="complementarity",
-    caption="The height at which a curve starts is the share of problems on which the solver is fastest; the height at "
-    "which it ends is the share that it solves at all. Residuals recomputed from the problem decide; refusals, wrong "
-    "answers and problems left out for time count as unsolved. Times are of the solve alone, after a warm-up: the "
-    "compiled solve of Siconos, a call from Python of the others. At most six curves; the numbers have all solvers.",
-)  # fmt: skip
+@recipe("performance-profile", "complementarity/profile")
 def performance_profile(numbers: Table) -> Drawn:
     """Draw a panel for each collection and kind of problem; the solvers of each kind have their own numbering."""
-    panels: list[Panel] = []
+    panels, rows = list[Panel](), list[tuple[Any, ...]]()
     legend: dict[str, LineStyle] = {}
-    for kind in ("frictionless", "friction"):
-        own = numbers.where(kind=kind)
-        looks = {name: STYLES[name] for name in dict.fromkeys(own.column("solver")) if name in STYLES}
+    for kind, collection in dict.fromkeys(numbers.select(("kind", "collection")).rows):
+        looks = looks_of(name for name in numbers.where(kind=kind).column("solver") if name in STYLES)
         legend |= looks
-        for collection in dict.fromkeys(own.column("collection")):
-            here = own.where(collection=collection)
-            last = {row["solver"]: row["share solved"] for row in here.records()}
-            words = ", ".join(f"{solver} {share:.0%}" for solver, share in last.items())
-            with Plot(f"performance-profile-{collection.replace(' ', '-')}-{kind}", (4.4, 3.2)) as plot:
-                for number, (solver, look) in enumerate(looks.items()):
-                    curve = here.where(solver=solver).select(("factor", "share solved")).rows
-                    if curve:
-                        how = line_arguments(look) | {"markevery": (number % 5, 9)}
-                        plot.axes.step(*zip(*curve, strict=True), where="post", **how)
-                plot.log("factor of the fastest solver's time", "share of problems solved", "x")
-                plot.axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0", "0.25", "0.5", "0.75", "1"])
-                plot.axes.set_ylim(-0.02, 1.03)
-            panels.append(Panel(plot.svg, f"Shares solved at all: {words}.", f"{collection}, {kind}"))
-    curves: dict[tuple[str, ...], list[float]] = {}
-    for *name, share in numbers.select(("collection", "kind", "solver", "share solved")).rows:
-        curves.setdefault(tuple(name), []).append(share)
+        curves: dict[str, list[tuple[float, float]]] = {}
+        for solver, *point in numbers.where(kind=kind, collection=collection).select(_PROFILE).rows:
+            curves.setdefault(solver, []).append((point[0], point[1]))
+        with Plot(f"performance-profile-{collection.replace(' ', '-')}-{kind}", (4.4, 3.2)) as plot:
+            for number, (solver, look) in enumerate(looks.items()):
+                if solver in curves:
+                    how = line_arguments(look) | {"markevery": (number % 5, 9)}
+                    plot.axes.step(*zip(*curves[solver], strict=True), where="post", **how)
+            plot.log("factor of the fastest solver's time", "share of problems solved", "x", ylim=(-0.02, 1.03))
+            plot.ticks("y", [0.0, 0.25, 0.5, 0.75, 1.0])
+        words = ", ".join(f"{solver} {curve[-1][1]:.0%}" for solver, curve in curves.items())
+        panels.append(Panel(plot.svg, f"Shares solved at all: {words}.", f"{collection}, {kind}"))
+        rows += [(collection, kind, solver, curve[0][1], curve[-1][1]) for solver, curve in curves.items()]
     ends = ("share as the fastest", "share solved at all")
-    rows = tuple((*name, shares[0], shares[-1]) for name, shares in curves.items())
-    return Drawn(tuple(panels), titled(("collection", "kind", "solver", *ends), rows, 3, timed=ends),
-                 tuple(legend.items()))  # fmt: skip
+    return Drawn(panels, titled(("collection", "kind", "solver", *ends), rows, 3, timed=ends), legend)
 
 
+_PROFILE = ("solver", "factor", "share solved")
 _ROUNDING = 1e-12  # smaller errors count as none
 _SCENES = 6  # shown, those with the largest errors
 _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over time": "error of velocities"}
 
 
-@recipe(
-    "rigid-convergence", "The ideal world converges to the event-driven solution", "complementarity/convergence",
-    section="complementarity",
-    caption="Each mark is the largest error of three time steps near it, before impacts accumulate. Curves parallel to "
-    "the dashed line have errors proportional to the step, the best order of a scheme that does not locate impacts. "
-    "The six scenes with the largest errors are drawn; the numbers have all.",
-)  # fmt: skip
+@recipe("rigid-convergence", "complementarity/convergence")
 def rigid_convergence(numbers: Table) -> Drawn:
     """Draw a panel for the errors of positions and one for those of velocities."""
     errors = {row["scene"]: max(row[column] for column in _ERRORS.values()) for row in numbers.records()}
@@ -266,10 +221,9 @@ def rigid_convergence(numbers: Table) -> Drawn:
                 drawn += curve
             if drawn:  # a line of slope one below all curves
                 lowest = min(error / step for step, error in drawn)
-                ends = (min(step for step, _ in drawn), max(step for step, _ in drawn))
+                ends = (min(drawn)[0], max(drawn)[0])
                 plot.curve([(step, 0.5 * lowest * step) for step in ends], BOUND, marked=False)
             plot.log("step [ms]", "error")
-            steps = sorted(set(numbers.column("step")))
-            plot.axes.set_xticks(steps, [f"{step:.2g}" for step in steps])
+            plot.ticks("x", sorted(set(numbers.column("step"))), "{:.2g}")
         panels.append(Panel(plot.svg, f"Errors of {label} against the step.", label))
-    return Drawn(tuple(panels), numbers, (*looks.items(), ("first order", BOUND)))
+    return Drawn(panels, numbers, looks | {"first order": BOUND})

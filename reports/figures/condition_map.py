@@ -31,23 +31,24 @@ def condition_map(key: str, title: str, caption: str, x: tuple[str, Sequence[flo
     ranked : whether x shows ranks, with a tick for each value, so that close values are drawn apart.
     """
     ticks = sorted(set(x[1])) if ranked else []
+    across = [float(ticks.index(value) if ranked else value) for value in x[1]]
     split = [""] * len(holds) if panels is None else [str(value) for value in panels]
     drawn = []
     for number, name in enumerate(dict.fromkeys(split)):
         places: dict[tuple[float, float], list[bool | None]] = {}
-        for across, up, held, panel in zip(x[1], y[1], holds, split, strict=True):
+        for *place, held, panel in zip(across, map(float, y[1]), holds, split, strict=True):
             if panel == name:
-                places.setdefault((float(ticks.index(across) if ranked else across), float(up)), []).append(held)
+                places.setdefault((place[0], place[1]), []).append(held)
         with Plot(f"{key}-{number}", _SIZE) as plot:
-            for place, trials in places.items():
+            for at, trials in places.items():
                 decided = [held for held in trials if held is not None]
                 share = float(np.mean(decided)) if decided else 0.0
                 if not decided:
-                    plot.marks([place], OUTCOMES["cannot tell"], markersize=5, zorder=3)
+                    plot.marks([at], OUTCOMES["cannot tell"], markersize=5, zorder=3)
                 elif share < 1.0:
-                    plot.marks([place], OUTCOMES["fails"], markersize=6, zorder=4)
+                    plot.marks([at], OUTCOMES["fails"], markersize=6, zorder=4)
                 if share > 0.0:
-                    plot.marks([place], OUTCOMES["holds"], markersize=_DOT * share**0.5, zorder=3)
+                    plot.marks([at], OUTCOMES["holds"], markersize=_DOT * share**0.5, zorder=3)
             plot.axes.margins(0.08)
             plot.axes.set(xlabel=x[0], ylabel=y[0])
             if ticks:

@@ -8,18 +8,18 @@ in the paper's Figure 4. Lengths are in metres and angles in radians, unless a n
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-from reports.figures.canvas import Canvas, arrow, draw_bodies, draw_walls, invert, scale_bar
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
 from reports.figures.geometry import body_outlines
-from reports.figures.labels import arrow_of_time, note_beside
-from reports.figures.plot import PATH, TIME, Plot
-from reports.figures.style import FORCE, MUTED, PANEL, STYLES, LineStyle, line_arguments
+from reports.figures.labels import arrow_of_time
+from reports.figures.plot import PATH, TIME, Canvas, Plot
+from reports.figures.style import MUTED, PANEL, STYLES, line_arguments
 from verification.table import Table, titled
 
 Floats = NDArray[np.float64]
@@ -35,16 +35,11 @@ DEVICE = {"IAPB": "device/IAPB", "IAPB LM": "device/IAPB-LM", "PB": "device/PB"}
 
 MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
-# The force of an impact in one step is hundreds of times the holding force afterwards. So each force is drawn at the
-# first contact, over the whole run, and magnified around the holding force (coordinate, heading, label, limit).
-_FORCES = ((0, "force along x", "Fx [N]", 1.5), (2, "torque", "τ [N m]", 0.03))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
 _AT_CONTACT = (0.01, 0.14)  # [s] before and after the first contact: the impulses of all worlds, separately visible
-# deviations from the hand in the ideal world: coordinates, name, axis label, unit factor
-_DEVIATIONS = ((slice(0, 2), "position", "distance from ideal [mm]", MILLI),
-               (slice(2, 3), "angle", "angle from ideal [°]", DEGREES))  # fmt: skip
 _LAST_PART = 0.2  # of the run: long after the last impact of any world, the mean is the balance of forces
 _MARKS = 9  # markers along a curve: enough to identify it in grey print, few enough to see the line
+_PRINTED_RANGE = (-2.5, 0.05)  # ticks of Figure 7 that the paper's text keeps; a line of room for curves at 0
 # A peg slower than this (and turning slower than this) counts as settled: a tenth of its speed at contact, where
 # the eye no longer sees it move [m/s], [rad/s].
 SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
@@ -52,80 +47,68 @@ _FROM_IDEAL = "Distances from the ideal trajectory are root mean squares over th
 _SETTLED = "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
 _HELD = ("Held: mean over the last fifth of the run. The hand pushes with Fx = −0.32 N, Fy = 0.4 N, so a world in "
          "balance holds 0.32 and −0.4 N.")  # fmt: skip
-_LOST_AXES = "The axes that the paper printed are lost; ours show all values."
 _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
 
 
-def _recipe(number: int, title: str, runs: Mapping[str, str], forces: bool, caption: str) -> Recipe:
+def _recipe(number: int, runs: Mapping[str, str], forces: bool) -> Recipe:
     """Return the recipe of a figure of the paper with trajectories or forces of some runs."""
     key = f"fig{number:02d}"
 
     def draw(*given: Run) -> Drawn:
         named = dict(zip(runs, given, strict=True))
-        panels, numbers = _force_figure(key, named) if forces else _trajectory_figure(key, named, runs)
-        return Drawn(tuple(panels), numbers, legend_of(named))
+        panels, numbers = _forces(key, named) if forces else _trajectories(key, named, runs)
+        return Drawn(panels, numbers, {curve: STYLES[curve] for curve in runs})
 
-    return recipe(key, title, *runs.values(), caption=caption, number=f"Figure {number}")(draw)
-
-
-def legend_of(names: Mapping[str, Any]) -> tuple[tuple[str, LineStyle], ...]:
-    """Return the legend: each curve with its style."""
-    return tuple((curve, STYLES[curve]) for curve in names)
+    return recipe(key, *runs.values())(draw)
 
 
-def marks(count: int, number: int) -> tuple[int, int]:
+def _marks(count: int, number: int) -> tuple[int, int]:
     """Return matplotlib's `markevery` (first, every), with which coinciding curves show their markers side by side."""
     every = max(count // _MARKS, 1)
     return (number * every // 5) % every, every
 
 
-def first_shown(runs: Mapping[str, Run], before: float = _BEFORE_CONTACT) -> int:
+def _first_shown(runs: Mapping[str, Run], before: float) -> int:
     """Return the step `before` [s] the first contact of any run; up to that contact all paths are the same line."""
     touching = [int(np.flatnonzero(np.diff(run.contacts.offsets))[0]) for run in runs.values() if len(run.contacts.gap)]
-    dt = next(iter(runs.values())).dt
-    return max(min(touching) - round(before / dt), 0) if touching else 0
+    return max(min(touching) - round(before / next(iter(runs.values())).dt), 0) if touching else 0
 
 
-_PRINTED_RANGE = (-2.5, 0.05)  # ticks of Figure 7 that the paper's text keeps; a line of room for curves at 0
-
-# Trajectories
-
-
-def _trajectory_figure(key: str, runs: Mapping[str, Run], names: Mapping[str, str]) -> tuple[list[Panel], Table]:
+def _trajectories(key: str, runs: Mapping[str, Run], names: Mapping[str, str]) -> tuple[list[Panel], Table]:
     """Draw the path and the three coordinates; for limited devices, also tool against device and penetration."""
+    everyone, over = ", ".join(runs), partial(_over_time, key, runs)
     ends = "; ".join("{} ends at ({:.1f}, {:.1f})".format(curve, *(MILLI * run.device_q[-1, :2]))
                      for curve, run in runs.items())  # fmt: skip
     panels = [Panel(_path(f"{key}-path", runs), f"Paths of the hand in the plane, in mm: {ends}.",
                     "path of the hand, from just before contact")]  # fmt: skip
-    everyone = ", ".join(runs)
     for k, (name, unit, factor) in enumerate(_COORDINATES):
-        values = {curve: factor * run.device_q[:, k] for curve, run in runs.items()}
-        panels.append(_over_time(f"{key}-{'xyz'[k]}", runs, values, f"{name} [{unit}]", f"{name} over time",
-                                 f"{name} of the hand over time in {unit}, for {everyone}."))
+        panels.append(over("xyz"[k], {curve: factor * run.device_q[:, k] for curve, run in runs.items()},
+                           f"{name} [{unit}]", f"{name} over time",
+                           f"{name} of the hand over time in {unit}, for {everyone}."))  # fmt: skip
     if "ideal" in runs:
         ideal = runs["ideal"].device_q
-        for which, name, axis, factor in _DEVIATIONS:
-            values = {curve: factor * np.linalg.norm(run.device_q[: len(ideal), which]
-                                                     - ideal[: len(run.device_q), which], axis=1)
+        for which, name, axis, factor in ((slice(0, 2), "position", "distance from ideal [mm]", MILLI),
+                                          (slice(2, 3), "angle", "angle from ideal [°]", DEGREES)):
+            values = {curve: factor * np.linalg.norm(_apart(run.device_q, ideal)[:, which], axis=1)
                       for curve, run in runs.items() if curve != "ideal"}  # fmt: skip
             largest = ", ".join(f"{curve} {value.max():.2g}" for curve, value in values.items())
-            panels.append(_over_time(f"{key}-off-{name}", runs, values, axis, f"deviation from ideal, {name}",
-                                     f"{axis} over time; at most: {largest}."))
+            panels.append(over(f"off-{name}", values, axis, f"deviation from ideal, {name}",
+                               f"{axis} over time; at most: {largest}."))
     if names == UNLIMITED:  # beyond the final position in the ideal world, on the axis of the printed Figure 7
         values = {curve: MILLI * (runs["ideal"].device_q[-1, 1] - run.device_q[:, 1]) for curve, run in runs.items()}
         deepest = ", ".join(f"{curve} {value.min():.2f}" for curve, value in values.items())
-        panels.append(_over_time(f"{key}-printed", runs, values, "past the rigid place [mm]",
-                                 "depth along y past the rigid place, on the printed range",
-                                 f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
-                                 height=_PRINTED_RANGE))  # fmt: skip
+        panels.append(over("printed", values, "past the rigid place [mm]",
+                           "depth along y past the rigid place, on the printed range",
+                           f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
+                           height=_PRINTED_RANGE))  # fmt: skip
     if names in (LIMITED, STRATEGIES):
         apart = {curve: MILLI * np.hypot(*(tool_positions(run)[:, :2] - run.device_q[:, :2]).T)
                  for curve, run in runs.items()}  # fmt: skip
         depths = {curve: MILLI * penetration_over_time(run) for curve, run in runs.items()}
-        panels += [_over_time(f"{key}-apart", runs, apart, "distance [mm]", "how far tool and device come apart",
-                              f"Distance between tool and device over time, for {everyone}."),
-                   _over_time(f"{key}-depth", runs, depths, "penetration [mm]", "how deep the virtual peg sinks in",
-                              f"Penetration of the virtual peg over time, for {everyone}.")]  # fmt: skip
+        panels += [over("apart", apart, "distance [mm]", "how far tool and device come apart",
+                        f"Distance between tool and device over time, for {everyone}."),
+                   over("depth", depths, "penetration [mm]", "how deep the virtual peg sinks in",
+                        f"Penetration of the virtual peg over time, for {everyone}.")]  # fmt: skip
     reference = "ideal" if "ideal" in runs else None
     distances = ("distance from ideal: x [mm]", "y [mm]", "θ [°]") if reference else ()
     columns = ("world", *distances, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
@@ -133,34 +116,38 @@ def _trajectory_figure(key: str, runs: Mapping[str, Run], names: Mapping[str, st
     return panels, titled(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)
 
 
+def _apart(path: Floats, other: Floats) -> Floats:
+    """Return the difference of two paths over the time of the shorter one."""
+    return path[: len(other)] - other[: len(path)]
+
+
 def _path(key: str, runs: Mapping[str, Run], size: tuple[float, float] = PANEL, *, equal: bool = False) -> str:
     """Draw y against x of the device, from shortly before the first contact."""
     with Plot(key, size, kind="" if equal else PATH) as plot:
         for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[first_shown(runs) :, :2].T
-            plot.axes.plot(x, y, **line_arguments(STYLES[curve]),
-                           markevery=marks(len(x), number), zorder=3 + number / 10)
+            x, y = MILLI * run.device_q[_first_shown(runs, _BEFORE_CONTACT) :, :2].T
+            plot.axes.plot(x, y, **line_arguments(STYLES[curve]), markevery=_marks(len(x), number),
+                           zorder=3 + number / 10)
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
         if equal:
             plot.axes.set_aspect("equal", adjustable="datalim")
-        invert(plot.axes)
+        plot.axes.xaxis.set_inverted(True)
+        plot.axes.yaxis.set_inverted(True)
         arrow_of_time(plot.axes)
     return plot.svg
 
 
-def _over_time(key: str, runs: Mapping[str, Run], values: Mapping[str, Floats], axis: str, label: str, alt: str, *,
-               height: tuple[float, float] | None = None, first: int = 0, last: int | None = None,
+def _over_time(key: str, runs: Mapping[str, Run], suffix: str, values: Mapping[str, Floats], axis: str, label: str,
+               alt: str, *, height: tuple[float, float] | None = None, first: int = 0, last: int | None = None,
                **how: Any) -> Panel:  # fmt: skip
     """Draw a quantity of each run over time, from step `first` to step `last`; `height` limits the vertical axis."""
-    with Plot(key, kind=TIME) as plot:
+    with Plot(f"{key}-{suffix}", kind=TIME) as plot:
         for number, (curve, whole) in enumerate(values.items()):
             shown, run = whole[first:last], runs[curve]
             plot.axes.plot(run.time[first : first + len(shown)], shown, **line_arguments(STYLES[curve]), **how,
-                           markevery=marks(len(shown), number), zorder=3 + number / 10)
+                           markevery=_marks(len(shown), number), zorder=3 + number / 10)
         longest = max((runs[curve] for curve in values), key=lambda run: run.steps)
-        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=(longest.time[first], longest.time[: last][-1]))
-        if height is not None:
-            plot.axes.set_ylim(height)
+        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=(longest.time[first], longest.time[: last][-1]), ylim=height)
     return Panel(plot.svg, alt, label)
 
 
@@ -189,8 +176,7 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
     run = runs[curve]
     apart: tuple[float, ...] = ()
     if reference:  # root mean square over the whole run
-        other = runs[reference].device_q
-        off = np.sqrt(np.mean((run.device_q[: len(other)] - other[: len(run.device_q)]) ** 2, axis=0))
+        off = np.sqrt(np.mean(_apart(run.device_q, runs[reference].device_q) ** 2, axis=0))
         apart = tuple(float(off[k] * factor) for k, (_, _, factor) in enumerate(_COORDINATES))
     widest = np.max(np.abs(tool_positions(run) - run.device_q), axis=0)
     lengths = (float(penetration_over_time(run).max(initial=0.0)), float(np.hypot(*widest[:2])))
@@ -198,27 +184,25 @@ def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[ob
             settling_time(run))
 
 
-# Forces that the device's actuators apply
+def _forces(key: str, runs: Mapping[str, Run]) -> tuple[list[Panel], Table]:
+    """Draw force along x and torque at the first contact, over the whole run, and magnified around the holding force.
 
-
-def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[list[Panel], Table]:
-    """Draw force along x and torque at the first contact, over the whole run and between impulses.
-
-    The table has the peak forces and the forces held at the end.
+    The force of an impact in one step is hundreds of times the holding force afterwards. The table has the peak forces
+    and the forces held at the end.
     """
-    start = first_shown(runs, _AT_CONTACT[0])
-    end = start + round(sum(_AT_CONTACT) / next(iter(runs.values())).dt)
+    start, span = _first_shown(runs, _AT_CONTACT[0]), sum(_AT_CONTACT)
+    contact = {"first": start, "last": start + round(span / next(iter(runs.values())).dt)}
     panels = []
-    for k, title, label, cut in _FORCES:
+    for k, title, name, unit, cut in ((0, "force along x", "Fx", "N", 1.5), (2, "torque", "τ", "N m", 0.03)):
         views: dict[str, dict[str, Any]] = {
-            f"at the first contact: {sum(_AT_CONTACT):g} s": {"first": start, "last": end}, "the whole run": {},
-            f"between impulses: cut at ±{cut:g} {label[label.index('[') + 1 : -1]}": {"height": (-cut, cut)},
+            f"at the first contact: {span:g} s": contact, "the whole run": {},
+            f"between impulses: cut at ±{cut:g} {unit}": {"height": (-cut, cut)},
         }  # fmt: skip
         values = {curve: run.device_force[:, k] for curve, run in runs.items()}
         for letter, (view, shown) in zip("cam", views.items(), strict=True):
-            panels.append(_over_time(f"{key}-{k}{letter}", runs, values, label, f"{title}, {view}",
-                                     f"{label} over time, {view}, for {', '.join(runs)}.", drawstyle="steps-post",
-                                     **shown))
+            panels.append(_over_time(key, runs, f"{k}{letter}", values, f"{name} [{unit}]", f"{title}, {view}",
+                                     f"{name} [{unit}] over time, {view}, for {', '.join(runs)}.",
+                                     drawstyle="steps-post", **shown))  # fmt: skip
     columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
                "held τ [N m]")
     rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(),
@@ -227,38 +211,9 @@ def _force_figure(key: str, runs: Mapping[str, Run]) -> tuple[list[Panel], Table
     return panels, titled(columns, rows, digits=3, note=_HELD)
 
 
-RECIPES = (
-    _recipe(7, "Hand trajectories of the four worlds", UNLIMITED, False,
-        "The peg starts from rest, tilted, and a constant force pushes it into the lower right corner. The thick "
-        "line is the ideal world, with rigid contact. Look at which curves leave it at the first contact and which "
-        "return to it. The device can apply any force. Of the paper's axes one range is known, 0 to −2.5; its unit, "
-        "the other axis and the start of the peg are not. Our axes are therefore in mm and degrees. The fifth and "
-        "sixth panel show the distance from ideal at each instant, in position and in angle. The last panel uses the "
-        "printed range, in mm, for the depth of the hand beyond the place where the ideal world stops it."),
-    _recipe(8, "Forces that the hand feels", UNLIMITED, True,
-        "At the first contact the worlds with impulses render pulses of one step each, while the penalty force rises "
-        "over many steps. Further panels show the whole run, and the small forces between the pulses, to be compared "
-        f"with the 0.32 N that balance the hand. {_LOST_AXES}"),
-    _recipe(9, "Three ways to respect the limits of the device", STRATEGIES, False,
-        "The device can apply at most 15 N and 1 N m. Saturating clips the impulse for the device only, so tool and "
-        "device separate. Scaling reduces the impulse for both. Spreading repeats the scaled impulse in the next "
-        f"steps. The fifth and sixth panel show the distance from ideal. {_LOST_AXES}"),
-    _recipe(10, "Hand trajectories with a limited device", LIMITED, False,
-        "As Figure 7, but IAPB spreads each impulse over as many steps as the limits of 15 N and 1 N m require. The "
-        "fifth and sixth panel show the distance from ideal, the last the penetration of the virtual peg, which is "
-        f"zero in the ideal world and in CBuc. {_LOST_AXES}"),
-    _recipe(11, "Forces with a limited device", LIMITED, True,
-        "As Figure 8 with spread impulses. At the first contact IAPB now takes several steps of at most 15 N; "
-        f"compare them with the slow rise of the penalty force. {_LOST_AXES}"),
-    _recipe(12, "Emulated device at 512 Hz: trajectories", DEVICE, False,
-        "The paper measured these trajectories on hardware. Here the device is emulated at 512 Hz, with the delay, "
-        "quantisation and damping given in the scene. Look at how often each curve bounces and when it comes to "
-        f"rest. {_LOST_AXES}"),
-    _recipe(13, "Emulated device at 512 Hz: forces", DEVICE, True,
-        "Forces of the emulated device in the runs of Figure 12. IAPB LM spreads its impulses so that each stays "
-        "within the limits of the device. The fine chatter comes from the resolution of the encoders, amplified by "
-        f"the damping of the position channel. {_LOST_AXES}"),
-)  # fmt: skip
+RECIPES = tuple(_recipe(number, runs, forces) for number, runs, forces in (
+    (7, UNLIMITED, False), (8, UNLIMITED, True), (9, STRATEGIES, False), (10, LIMITED, False), (11, LIMITED, True),
+    (12, DEVICE, False), (13, DEVICE, True)))  # fmt: skip
 
 
 # The first picture
@@ -269,14 +224,7 @@ _FORCE_LENGTH = 0.013  # [m] on paper per newton
 _SIZE = (4.5, 3.8)  # inches
 
 
-@recipe(
-    "hero", "Four worlds in one corner", *UNLIMITED.values(), section="hero",
-    caption="A constant force pushes a tilted peg into a corner. First picture: outlines of the peg in the ideal world "
-    "(rigid contact), from start to end. Second picture, magnified: the path of the hand from shortly before the first "
-    "contact; the arrow shows the direction of time. The closer a path is to the ideal one, the more the wall feels "
-    "rigid. The peg starts with a tilt of 0.015 rad. Up to this tilt IAPB is closest to ideal in x and y; for larger "
-    "tilts often not, and in the angle rarely. The map of claim C10 below shows every start.",
-)  # fmt: skip
+@recipe("hero", *UNLIMITED.values())
 def hero(*given: Run) -> Drawn:
     """Draw the picture from the runs named in UNLIMITED."""
     runs = dict(zip(UNLIMITED, given, strict=True))
@@ -290,23 +238,21 @@ def hero(*given: Run) -> Drawn:
               "Paths of the hand in the four worlds. Distance of the hand from the ideal at the end: "
               f"{ends}.", "the path of the hand, magnified, equal scales"),
     )  # fmt: skip
-    return Drawn(panels, None, legend_of(UNLIMITED))
+    return Drawn(panels, None, {curve: STYLES[curve] for curve in UNLIMITED})
 
 
 def _motion(run: Run) -> str:
     scene = run.scene_resolved
-    corners = np.vstack([outline for k in (0, -1) for _, outline in body_outlines(scene, run.pose[k])])
+    corners = np.vstack(body_outlines(scene, run.pose[0]) + body_outlines(scene, run.pose[-1]))
     low, high = np.minimum(corners.min(axis=0), 0.0) - _MARGIN, np.maximum(corners.max(axis=0), 0.0) + _MARGIN
     with Canvas("hero-scene", low, high, _SIZE, turned=True) as canvas:
-        axes = canvas.axes
-        draw_walls(axes, scene, reach=1.0)
-        draw_bodies(axes, scene, run.pose[-1])
+        canvas.walls(scene)
+        canvas.bodies(scene, run.pose[-1])
         moved = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run.q[:, :2], axis=0).T))])
         for k in np.searchsorted(moved, np.arange(_GHOSTS) / _GHOSTS * moved[-1]):  # even along the path, not in time
-            draw_bodies(axes, scene, run.pose[k], color="none", edge=MUTED, width=0.8)
-        axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
-        start, force = run.q[0, :2], np.asarray(scene["hand"]["force"][:2])
-        arrow(axes, start, _FORCE_LENGTH * force)
-        scale_bar(axes, (high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm", turned=True)
-        note_beside(axes, start, start + _FORCE_LENGTH * force, f"hand, {np.hypot(*force):.2f} N", 9, color=FORCE)
+            canvas.bodies(scene, run.pose[k], color="none", edge=MUTED, width=0.8)
+        canvas.axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
+        force = np.asarray(scene["hand"]["force"][:2])
+        canvas.scale_bar((high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm")
+        canvas.named_arrow(run.q[0, :2], _FORCE_LENGTH * force, f"hand, {np.hypot(*force):.2f} N")
     return canvas.svg

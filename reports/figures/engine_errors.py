@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import log10
 from typing import Any
 
@@ -11,20 +11,15 @@ from reports.figures.numbers import MINUS
 from reports.figures.style import AMBER, BLUE, RULE, SKY, VERMILION, LineStyle
 from verification.table import Table
 
+Row = Mapping[str, Any]
+
 LEVELS = {"to 10⁻⁶": (1e-6, BLUE, 0.75), "to 10⁻²": (1e-2, SKY, 0.55), "to 10⁻¹": (1e-1, AMBER, 0.6),
           "above": (float("inf"), VERMILION, 0.75)}  # fmt: skip
 ROUNDING = 1e-15
 _PANELS = (("energy error", "energy error"), ("momentum error", "momentum error"), ("overlap / size", "overlap"))
 
 
-@recipe(
-    "engine-errors", "Energy, momentum and overlap, by engine", "engines/errors", section="engines",
-    caption="One row per engine and choice of settings, one column per scene. First table: error of the energy at "
-    "the end, relative to the energy at the start (resting scenes: its largest rise). Second: error of the momentum at "
-    "the end, relative to the sum of m |v|; resting scenes have none. Third: the deepest overlap, relative to the "
-    "bodies' size. The numbers are powers of ten; ε means rounding or zero. A cross: the run failed. Hatching: the "
-    "engine is not installed.",
-)  # fmt: skip
+@recipe("engine-errors", "engines/errors")
 def engine_errors(numbers: Table) -> Drawn:
     """Draw the three tables."""
     rows = numbers.records()
@@ -33,22 +28,19 @@ def engine_errors(numbers: Table) -> Drawn:
     for column, label in _PANELS:
         lines: dict[str, dict[str, Cell]] = {}
         for row in rows:
-            lines.setdefault(f"{row['engine']}, {_at(row)}", {})[row["scene"]] = _cell(row, value_of(row, column))
+            lines.setdefault(f"{row['engine']}, {_at(row)}", {})[row["scene"]] = _cell(row, _value(row, column))
         cells = {line: [found.get(scene, Cell()) for scene in scenes] for line, found in lines.items()}
         panels.append(Panel(grid(scenes, cells, "upright"), _words(rows, column), label))
-    legend = tuple((name, LineStyle(color, "s", (), 0.0)) for name, (_, color, _) in LEVELS.items())
-    return Drawn(tuple(panels), numbers, legend)
+    return Drawn(panels, numbers, {name: LineStyle(color, "s", (), 0.0) for name, (_, color, _) in LEVELS.items()})
 
 
-def value_of(row: Mapping[str, Any], column: str) -> float | None:
-    """Return the absolute value of a cell; without an energy error, return the largest rise of energy."""
-    value = row[column]
-    if value is None and column == "energy error":
-        value = row["largest rise of energy"]
+def _value(row: Row, column: str) -> float | None:
+    """Return the absolute value of a cell; without an energy error, the largest rise of energy."""
+    value = row["largest rise of energy"] if row[column] is None and column == "energy error" else row[column]
     return None if value is None else abs(value)
 
 
-def _cell(row: Mapping[str, Any], value: float | None) -> Cell:
+def _cell(row: Row, value: float | None) -> Cell:
     if row["law"] == "not installed":
         return Cell(hatched=True)
     if row["law"] == "failed":
@@ -59,15 +51,15 @@ def _cell(row: Mapping[str, Any], value: float | None) -> Cell:
     return Cell("ε" if value < ROUNDING else f"{round(log10(value))}".replace("-", MINUS), "", color, strength)
 
 
-def _at(row: Mapping[str, Any]) -> str:
+def _at(row: Row) -> str:
     return "own" if row["settings"] == "own" else "1 ms"
 
 
-def _words(rows: list[dict[str, Any]], column: str) -> str:
+def _words(rows: Sequence[Row], column: str) -> str:
     said = []
     for engine in dict.fromkeys(row["engine"] for row in rows):
         mine = [row for row in rows if row["engine"] == engine]
-        known = [(value, row) for row in mine if (value := value_of(row, column)) is not None]
+        known = [(value, row) for row in mine if (value := _value(row, column)) is not None]
         if known:
             worst, where = max(known, key=lambda pair: pair[0])
             said.append(f"{engine} at most {worst:.1e}, in {where['scene']} ({_at(where)})")

@@ -1,21 +1,25 @@
-"""Figure: one drawing of the report as plain values. Recipe: the inputs of a figure and its drawing function.
+"""A drawn figure as plain values, the recipe that draws it, and a figure as a file of its own.
 
-A figure consists of a few panels (they wrap on a narrow screen), each one SVG or a table of coloured cells, a legend, a
-caption that says what to see, and the numbers behind it. This module depends neither on matplotlib nor on the page.
+A figure has a few panels (they wrap on a narrow screen), each one SVG or a table of coloured cells, a legend, a caption
+that says what to see, and the numbers behind it. Titles and captions are in figures.toml, in page order. This module
+depends neither on matplotlib nor on the page.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.resources import files
 from typing import Any
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
-from reports.figures.style import LineStyle, css
+from reports.figures.style import INK, MUTED, PAPER, LineStyle, css
 from verification.table import Table
 
-Legend = tuple[tuple[str, LineStyle], ...]
+Legend = Mapping[str, LineStyle] | Iterable[tuple[str, LineStyle]]
 
 
 @dataclass(frozen=True)
@@ -71,12 +75,12 @@ def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Cell]], kind: str =
 
 @dataclass(frozen=True)
 class Drawn:
-    """The result of a recipe's function; a non-empty `caption` replaces the caption of the recipe."""
+    """The result of a recipe's function; `told` are the values that the caption names."""
 
-    panels: tuple[Panel, ...]
+    panels: Sequence[Panel]
     numbers: Table | None = None
     legend: Legend = ()
-    caption: str = ""
+    told: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -89,7 +93,7 @@ class Figure:
     caption: str
     panels: tuple[Panel, ...]
     numbers: Table | None = None
-    legend: Legend = ()
+    legend: tuple[tuple[str, LineStyle], ...] = ()
     inputs: tuple[str, ...] = ()  # names of the runs and tables it was drawn from
 
 
@@ -100,7 +104,7 @@ class NotComputed:
     key: str
     number: str
     title: str
-    missing: tuple[str, ...] = field(default=())
+    missing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,30 +121,95 @@ class Recipe:
     draw: Callable[[Mapping[str, Any]], Figure | NotComputed]
     section: str = "figures"
 
-    def missing(self, inputs: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return the names in `needs` for which there is no input."""
-        return tuple(name for name in self.needs if inputs.get(name) is None)
+
+TEXTS: Mapping[str, Mapping[str, str]] = tomllib.loads(files(__package__).joinpath("figures.toml").read_text("utf-8"))
+MADE: dict[str, Recipe] = {}
 
 
-def recipe(
-    key: str, title: str, *needs: str, caption: str, section: str = "figures", number: str = ""
-) -> Callable[[Callable[..., Drawn]], Recipe]:
-    """Make a recipe from the decorated function, which gets one argument per input."""
+def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
+    """Make the recipe `key` of figures.toml from the decorated function, which gets one argument per input."""
+    text = TEXTS[key]
+    number, title = text.get("number", ""), text["title"]
 
     def made(function: Callable[..., Drawn]) -> Recipe:
         def draw(inputs: Mapping[str, Any]) -> Figure:
             drawn = function(*(inputs[name] for name in needs))
-            told = drawn.caption or caption
-            return Figure(key, number, title, told, drawn.panels, drawn.numbers, drawn.legend, needs)
+            caption = " ".join(text["caption"].split()).format(**drawn.told)
+            return Figure(key, number, title, caption, tuple(drawn.panels), drawn.numbers,
+                          tuple(dict(drawn.legend).items()), needs)
 
-        return Recipe(key, number, title, needs, draw, section)
+        MADE[key] = Recipe(key, number, title, needs, draw, text.get("section", "figures"))
+        return MADE[key]
 
     return made
 
 
 def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure | NotComputed:
     """Draw one figure, or return which of its inputs are missing."""
-    missing = recipe.missing(inputs)
-    if missing:
-        return NotComputed(recipe.key, recipe.number, recipe.title, missing)
-    return recipe.draw({name: inputs[name] for name in recipe.needs})
+    missing = tuple(name for name in recipe.needs if inputs.get(name) is None)
+    return NotComputed(recipe.key, recipe.number, recipe.title, missing) if missing else recipe.draw(inputs)
+
+
+# A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of the page's variables
+
+_GAP, _LABEL, _LEGEND = 24.0, 26.0, 34.0  # points: between panels, above them, below them
+_LETTER = 6.4  # points: mean width of a letter of the legend
+_FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="11"'
+_TABLE = (
+    "body { font: 14px/1.4 Verdana, sans-serif } table { border-collapse: collapse } th { font-weight: 400 } "
+    "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } small { display: block } "
+    "th[scope=row], .plain * { text-align: left } .swatch { width: 36px; height: 14px } "
+    ".hatched { background: repeating-linear-gradient(135deg, #ccc 0 1px, transparent 1px 5px) } "
+    "li { list-style: none } .upright thead span { writing-mode: vertical-rl; rotate: 180deg }"
+)
+_MARKERS = {  # paths around (18, 7)
+    "o": "M14.4 7a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0z", "s": "M14.6 3.6h6.8v6.8h-6.8z",
+    "^": "M18 2.6 22 10.4 14 10.4z", "v": "M18 11.4 22 3.6 14 3.6z", "<": "M13.6 7 21.4 11V3z",
+    ">": "M22.4 7 14.6 11V3z", "D": "M18 2.4 22.6 7 18 11.6 13.4 7z", "d": "M18 2 20.6 7 18 12 15.4 7z",
+    "P": "M16.4 3h3.2v2.4H22v3.2h-2.4V11h-3.2V8.6H14V5.4h2.4z", "|": "M17 2h2v10h-2z",
+    "X": "M14.5 5 16 3.5l2 2 2-2L21.5 5l-2 2 2 2L20 10.5l-2-2-2 2L14.5 9l2-2z",
+    "*": "M18 2l1.4 3.4 3.6.2-2.8 2.3 1 3.6L18 9.5l-3.2 2 1-3.6L13 5.6l3.6-.2z",
+}  # fmt: skip
+
+
+def swatch(look: LineStyle) -> Markup:
+    """Return the line and marker of a style, for legends, as a small inline SVG."""
+    line = marker = ""
+    if look.width:
+        dash = f' stroke-dasharray="{" ".join(f"{1.6 * part:g}" for part in look.dash)}"' if look.dash else ""
+        line = f'<path d="M1 7H35" fill="none" stroke="{css(look.color)}" stroke-width="{look.width * 1.25:g}"{dash}/>'
+    if look.marker:
+        fill, edge = (look.color, PAPER) if look.filled else (PAPER, look.color)
+        marker = f'<path fill="{css(fill)}" stroke="{css(edge)}" d="{_MARKERS[look.marker]}"/>'
+    return Markup(f'<svg class="swatch" viewBox="0 0 36 14" aria-hidden="true">{line}{marker}</svg>')
+
+
+def standalone(figure: Figure) -> str:
+    """Return the figure as the text of one SVG file, or of one HTML file if a panel is a table."""
+    if any(panel.is_table for panel in figure.panels):
+        legend = Markup("").join(Markup("<li>{} {}</li>").format(swatch(look), text) for text, look in figure.legend)
+        panels = Markup("").join(Markup("<h3>{}</h3>{}").format(panel.label, Markup(panel.svg))
+                                 for panel in figure.panels)  # fmt: skip
+        return str(Markup('<!DOCTYPE html>\n<meta charset="utf-8"><title>{0}</title><style>{1}</style>\n<h2>{0}</h2>'
+                          "<ul>{2}</ul>{3}<p>{4}</p>\n").format(figure.title, Markup(_TABLE), legend, panels,
+                                                                figure.caption))  # fmt: skip
+    parts, x, tallest = [], _GAP, 0.0
+    for panel in figure.panels:
+        width, height = (float(part) for part in re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', panel.svg)[0])
+        parts.append(f'<text x="{x:g}" y="{_LABEL - 6:g}" fill="{MUTED}">{escape(panel.label)}</text>')
+        place = f'<svg x="{x:g}" y="{_LABEL:g}" width="{width:g}" height="{height:g}"'
+        parts.append(panel.svg.replace("<svg", place, 1))
+        x, tallest = x + width + _GAP, max(tallest, height)
+    whole, below = x, tallest + _LABEL + _GAP + 0.5 * _LEGEND
+    steps = [66 + _LETTER * len(text) for text, _ in figure.legend]
+    x = (whole - sum(steps)) / 2
+    for (text, look), step in zip(figure.legend, steps, strict=True):
+        parts.append(swatch(look).replace("<svg", f'<svg x="{x:g}" y="{below - 11:g}" width="36" height="14"', 1))
+        parts.append(f'<text x="{x + 44:g}" y="{below:g}" fill="{INK}">{escape(text)}</text>')
+        x += step
+    width, height = whole, below + 0.5 * _LEGEND
+    return "\n".join([
+        f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+        f'viewBox="0 0 {width:g} {height:g}" width="{width:g}" height="{height:g}" role="img" {_FONT}>',
+        f"<title>{escape(figure.title)}</title><desc>{escape(' '.join(panel.alt for panel in figure.panels))}</desc>",
+        f'<rect width="100%" height="100%" fill="{PAPER}"/>', *parts, "</svg>\n"])  # fmt: skip

@@ -93,12 +93,20 @@ def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
     return point + reach * np.array([along, along - 2 * normal, -along - 2 * normal, -along])
 
 
-def body_outlines(scene: Mapping[str, Any], pose: Floats | None = None) -> Iterator[tuple[str, Floats]]:
-    """Yield (body, corners in world axes) for every shape of every body."""
+def body_outlines(scene: Mapping[str, Any], pose: Floats | None = None) -> list[Floats]:
+    """Return the corners, in world axes, of every shape of every body."""
     places = body_placements(scene, pose)
-    for body in scene["bodies"]:
-        for shape in body["shapes"]:
-            yield body["name"], places[body["name"]].of(outline(shape))
+    return [places[body["name"]].of(outline(shape)) for body in scene["bodies"] for shape in body["shapes"]]
+
+
+def wall_outlines(scene: Mapping[str, Any], reach: float) -> list[Floats]:
+    """Return the corners of the static world, of half-planes those of a piece of size `reach`."""
+    return [half_plane(wall, reach) if wall["kind"] == "half_plane" else outline(wall) for wall in scene["walls"]]
+
+
+def is_turned(scene: Mapping[str, Any]) -> bool:
+    """Return whether a scene uses the paper's frame, x to the left and y down: it is drawn turned by 180 degrees."""
+    return str(scene["name"]).startswith("peg_")
 
 
 def bounds(points: Sequence[Floats], margin: float) -> tuple[Floats, Floats]:
@@ -106,6 +114,13 @@ def bounds(points: Sequence[Floats], margin: float) -> tuple[Floats, Floats]:
     every = np.vstack(points)
     low, high = every.min(axis=0), every.max(axis=0)
     return low - margin * max(high - low), high + margin * max(high - low)
+
+
+def widened(low: Floats, high: Floats, proportion: float) -> tuple[Floats, Floats]:
+    """Return the smallest rectangle with width / height = `proportion` around the given one, same centre."""
+    width, height = high - low
+    half = np.array([max(width, height * proportion), max(height, width / proportion)]) / 2
+    return (low + high) / 2 - half, (low + high) / 2 + half
 
 
 # Solids

@@ -1,11 +1,17 @@
-"""Checks of the mechanics: other coordinates (C06), a tumbling body, and false collisions in a socket (C18)."""
+"""Checks of the mechanics: other coordinates (C06), a tumbling body, false collisions (C18), impacts of touching balls.
+
+The outcomes of the impacts are labelled with the changes of energy and momentum. All treatments except per-body rows
+conserve both, but their outcomes differ nevertheless, because the choice of rows decides the outcome.
+"""
 
 from __future__ import annotations
 
-from reports.figures.canvas import note
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.plot import Plot
-from reports.figures.style import BOUND, MUTED, STYLES, LineStyle, line_arguments, looks_of
+from reports.figures.plot import Plot, arrow, note
+from reports.figures.style import BOUND, FORCE, INK, MUTED, PAPER, STYLES, LineStyle, line_arguments, looks_of
 from verification.table import Table
 
 _LOOKS = looks_of(("absolute angles", "place of the hand"))
@@ -14,18 +20,11 @@ _SMALLEST = 1e-18  # an error of zero is drawn here
 _SHOWN = ("one", "two, separated")  # contacts of the first panel: well conditioned ones
 
 
-@recipe(
-    "coordinate-invariance", "The same impact in other coordinates", "mechanics/coordinate invariance",
-    section="mechanics",
-    caption="An impact on an arm is solved in joint angles and in other coordinates; the error is the difference after "
-    "transforming back. First panel: the elbow straightens from left to right. At the singular pose the position of "
-    "the hand is no valid coordinate, and on the way there bound (dashed) and error grow. Absolute angles stay "
-    "accurate; their last mark is the straight arm itself. Second panel: every case, including nearly dependent rows; "
-    "below the dashed line the error is below the bound C ε κ/σ_min.",
-)  # fmt: skip
+@recipe("coordinate-invariance", "mechanics/coordinate invariance")
 def coordinate_invariance(numbers: Table) -> Drawn:
     """Draw the motion through the singular pose, and the error of every case against its bound."""
-    rows = [row | {"drawn": None if row["error"] is None else max(row["error"], _SMALLEST)}
+    rows = [row | {"elbow": max(row["elbow"], _STRAIGHT),
+                   "drawn": None if row["error"] is None else max(row["error"], _SMALLEST)}
             for row in numbers.records()]  # fmt: skip
     told = [row for row in rows if row["bound"] < 1.0 and row["error"] is not None]
     share = max(row["error"] / row["bound"] for row in told)
@@ -38,9 +37,8 @@ def coordinate_invariance(numbers: Table) -> Drawn:
             bounds: dict[float, float] = {}
             for row in sorted(shown, key=lambda row: -float(row["elbow"])):
                 bounds[row["elbow"]] = max(row["bound"], bounds.get(row["elbow"], 0.0))
-            pose.curve([(max(elbow, _STRAIGHT), most) for elbow, most in bounds.items()], _dashed(look, 1.3))
-            places = [(max(row["elbow"], _STRAIGHT), row["drawn"]) for row in shown if row["drawn"]]
-            pose.marks(places, look, markersize=5)
+            pose.curve(bounds.items(), LineStyle(look.color, "", BOUND.dash, 1.3))
+            pose.marks([(row["elbow"], row["drawn"]) for row in shown if row["drawn"]], look, markersize=5)
             bound.marks([(row["bound"], row["drawn"]) for row in mine if row["drawn"]], look, markersize=5)
         pose.axes.axhline(1.0, color=MUTED, linewidth=0.8)
         pose.axes.xaxis.set_inverted(True)
@@ -52,13 +50,8 @@ def coordinate_invariance(numbers: Table) -> Drawn:
         bound.log("bound C ε κ(M) κ(∂f/∂r)² / σ_min", "error of v⁺", ylim=(0.3 * _SMALLEST, 1e4))
         note(bound.axes, (1.0, 1e-17), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
     panels = Panel(pose.svg, words, "Towards the straight arm"), Panel(bound.svg, words, "Error against bound")
-    angles, hand = _LOOKS.values()
-    legend = (("in absolute angles", angles), ("in the place of the hand", hand), ("bound", BOUND))
-    return Drawn(panels, numbers, legend)
-
-
-def _dashed(look: LineStyle, width: float) -> LineStyle:
-    return LineStyle(look.color, "", BOUND.dash, width)
+    names = ("in absolute angles", "in the place of the hand", "bound")
+    return Drawn(panels, numbers, zip(names, (*_LOOKS.values(), BOUND), strict=True))
 
 
 _QUANTITIES = {
@@ -75,13 +68,7 @@ INTEGRATORS = {
 }
 
 
-@recipe(
-    "tumbling-drift", "A free body tumbles", "mechanics/tumbling", section="mechanics",
-    caption="A free body tumbles about its axis of middle inertia; its motion is known in closed form. Each mark is a "
-    "run of two seconds. The dashed lines have the slope of the order that the integrator declares. Runge-Kutta 4 adds "
-    "its stages as one rotation vector, so it declares order 2 for rotations. Its energy drift does not depend on the "
-    "attitude and coincides with that of the commutator-free method, which has order 4.",
-)  # fmt: skip
+@recipe("tumbling-drift", "mechanics/tumbling")
 def tumbling_drift(numbers: Table) -> Drawn:
     """Draw attitude error and drifts of each integrator against the step, with the declared slopes."""
     series = [(look, numbers.where(integrator=integrator, motion="turning over").records())
@@ -90,15 +77,15 @@ def tumbling_drift(numbers: Table) -> Drawn:
     for column, (name, label) in _QUANTITIES.items():
         with Plot(f"tumbling-drift-{name.split()[-1].lower()}") as plot:
             for look, rows in series:
-                steps, values, order = ([row[key] for row in rows] for key in ("step", column, "declared order"))
                 size = 5 if look.filled else 9  # so that marks which coincide are both seen
-                plot.marks(zip(steps, values, strict=True), look, markersize=size)
-                plot.curve([(step, values[0] * (step / steps[0]) ** order[0]) for step in steps], _dashed(look, 1.2))
+                plot.marks([(row["step"], row[column]) for row in rows], look, markersize=size)
+                start, order = rows[0], rows[0]["declared order"]
+                plot.curve([(row["step"], start[column] * (row["step"] / start["step"]) ** order) for row in rows],
+                           LineStyle(look.color, "", BOUND.dash, 1.2))  # fmt: skip
             plot.log("step [s]", label)
         ends = "; ".join(f"{look.name} {rows[0][column]:.1e} to {rows[-1][column]:.1e}" for look, rows in series)
         panels.append(Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name))
-    legend = (*((look.name, look) for look in INTEGRATORS.values()), ("declared slope", BOUND))
-    return Drawn(tuple(panels), numbers, legend)
+    return Drawn(panels, numbers, {look.name: look for look in INTEGRATORS.values()} | {"declared slope": BOUND})
 
 
 FILTERS = looks_of(("no filter", "coherence alone", "clustering alone", "both filters"))
@@ -106,14 +93,7 @@ _DAMPING = 40.0  # [N s/m] of the panels in time: the scene's own
 _DURATION = 2.0  # [s]
 
 
-@recipe(
-    "socket-collisions", "A ball rolls in a faceted socket", "mechanics/false collisions in time",
-    "mechanics/false collisions", section="mechanics",
-    caption="The facets approximate a round socket, in which the ball collides once and then rolls. Every further "
-    "collision is false. With temporal coherence the contact on the next facet is not new. Clustering alone leaves one "
-    "contact, which jumps from facet to facet and is new each time. Last panel: at low damping the ball bounces off "
-    "the edges, and its next contact is new to both filters.",
-)  # fmt: skip
+@recipe("socket-collisions", "mechanics/false collisions in time", "mechanics/false collisions")
 def socket_collisions(times: Table, counts: Table) -> Drawn:
     """Draw collision counts and energy losses over time, and the counts over damping."""
     found = ", ".join(f"{row['filters']} {row['false collisions']}"
@@ -138,13 +118,155 @@ def socket_collisions(times: Table, counts: Table) -> Drawn:
         panels.append(Panel(plot.svg, alt, title))
     dampings = sorted(set(counts.column("damping")))
     with Plot("socket-collisions-damping") as plot:
-        for number, (setting, style) in enumerate(FILTERS.items()):
-            for k, b in enumerate(dampings):
-                height = counts.where(filters=setting, damping=b).column("false collisions")[0]
-                plot.axes.bar(k + 0.2 * (number - 1.5), height, width=0.17, color=style.color)
-                note(plot.axes, (k + 0.2 * (number - 1.5), height), str(height), (0, 6), fontsize=8)
+        for row in counts.records():
+            number = list(FILTERS).index(row["filters"])
+            place = dampings.index(row["damping"]) + 0.2 * (number - 1.5)
+            plot.axes.bar(place, row["false collisions"], width=0.17, color=FILTERS[row["filters"]].color)
+            note(plot.axes, (place, row["false collisions"]), str(row["false collisions"]), (0, 6), fontsize=8)
         plot.axes.set_xticks(range(len(dampings)), [f"{b:g}" for b in dampings])
         plot.axes.grid(visible=False, axis="x")
         plot.axes.set(xlabel="damping of the contact [N s/m]", ylabel="false collisions in 2 s")
     panels.append(Panel(plot.svg, words, "By damping of the contact"))
-    return Drawn(tuple(panels), counts, tuple(FILTERS.items()))
+    return Drawn(panels, counts, FILTERS)
+
+
+# start of a treatment's name -> its look
+TREATMENTS = {
+    "simultaneous, relative": STYLES["relative rows (12)"],
+    "simultaneous, per-body": STYLES["per-body rows (13)-(14)"],
+    "event-driven": STYLES["event by event"],
+}
+CRADLE, BERNOULLI = "cradle of 5", "Bernoulli"
+ROUNDING = 1e-12  # smaller changes count as none
+_RADIUS = 0.5
+_ORDERS = {"contact 0, then 1": "the upper ball first", "contact 1, then 0": "the lower ball first"}
+
+
+class Outcome(NamedTuple):
+    """One treatment of one problem: velocities after the impact [m/s], and relative changes of energy and momentum."""
+
+    treatment: str
+    rows: str
+    velocity: tuple[tuple[float, float], ...]
+    energy: float
+    momentum: float
+
+    @property
+    def look(self) -> LineStyle:
+        """Return the colour and marker of the treatment."""
+        return next(look for start, look in TREATMENTS.items() if self.treatment.startswith(start))
+
+
+def outcomes(numbers: Table, problem: str) -> list[Outcome]:
+    """Return the outcomes of one problem from the table, which has a row per ball."""
+    found: dict[tuple[str, str], list[Any]] = {}
+    for row in numbers.where(problem=problem).records():
+        found.setdefault((row["treatment"], row["rows or order"]), []).append(row)
+    return [Outcome(*names, tuple((r["v_x after"], r["v_y after"]) for r in rows), rows[0]["energy change"],
+                    rows[0]["momentum change"]) for names, rows in found.items()]  # fmt: skip
+
+
+@recipe("linked-impacts", "mechanics/linked impacts")
+def linked_impacts(numbers: Table) -> Drawn:
+    """Draw both problems, and the velocity of the last ball of cradles of several lengths."""
+    cradle, bernoulli = outcomes(numbers, CRADLE), _without_twins(outcomes(numbers, BERNOULLI))
+    panels = (
+        Panel(_cradle(cradle), _words(cradle), "Newton's cradle of five: velocities after", wide=True),
+        Panel(_bernoulli(bernoulli), _words(bernoulli), "Bernoulli's three balls: velocities after", wide=True),
+        Panel(_last_ball(numbers), "Velocity of the last ball of cradles of 2 to 7 balls, by treatment.",
+              "Cradles of two to seven balls: what the last ball gets"),
+    )  # fmt: skip
+    return Drawn(panels, numbers, {look.name: look for look in TREATMENTS.values()})
+
+
+def _without_twins(found: Sequence[Outcome]) -> list[Outcome]:
+    """Merge outcomes of the same treatment with equal velocities into one, under the names of both row choices."""
+    kept: dict[Any, Outcome] = {}
+    for outcome in found:
+        key = (outcome.treatment, tuple(round(v, 9) + 0.0 for ball in outcome.velocity for v in ball))
+        twin = kept.get(key)
+        kept[key] = outcome if twin is None else twin._replace(rows=f"{twin.rows.split()[0]} or {outcome.rows}")
+    return list(kept.values())
+
+
+def _words(found: Sequence[Outcome]) -> str:
+    lost = [outcome for outcome in found if abs(outcome.momentum) > ROUNDING]
+    return (f"{len(found)} outcomes of one impact; {len(found) - len(lost)} conserve energy and momentum, "
+            f"{len(lost)} by per-body rows conserve energy only.")  # fmt: skip
+
+
+def _cradle(found: Sequence[Outcome]) -> str:
+    step, balls = 1.35, range(len(found[0].velocity))
+    with Plot("linked-impacts-cradle", (8.6, 0.52 * (len(found) + 1) + 0.3), bare=True) as plot:
+        axes = plot.axes
+        axes.set(xlim=(-8.6, 12.4), ylim=(-step * len(found) + 0.4, 2.5))
+        for x, text in ((-8.4, "rows taken, or order"), (9.0, "energy"), (11.0, "momentum")):
+            note(axes, (x, 2.2), text, ha="left" if x < 0 else "center", color=MUTED, fontsize=8.5)
+        before = tuple((float(ball == 0), 0.0) for ball in balls)
+        rows = [("before the impact", before, INK), *((_label(each), each.velocity, each.look.color) for each in found)]
+        for number, (label, velocity, color) in enumerate(rows):
+            y = step * (1 - number)
+            note(axes, (-8.4, y), label, ha="left", color=color)
+            _balls(axes, [(1.02 * k, y) for k in balls], velocity, color, 1.7)
+        for number, outcome in enumerate(found):
+            _kept(axes, (9.0, -step * number), outcome.energy)
+            _kept(axes, (11.0, -step * number), outcome.momentum)
+    return plot.svg
+
+
+def _label(outcome: Outcome) -> str:
+    if outcome.treatment.startswith("event"):
+        return _ORDERS.get(outcome.rows, outcome.rows)
+    return f"{outcome.treatment.split(', ')[1].split(' (')[0]}: {outcome.rows}"
+
+
+def _balls(axes: Any, centers: Sequence[tuple[float, float]], velocities: Sequence[tuple[float, float]], color: str,
+           scale: float) -> None:  # fmt: skip
+    from matplotlib.patches import Circle
+
+    for center, velocity in zip(centers, velocities, strict=True):
+        axes.add_patch(Circle(center, _RADIUS, facecolor=PAPER, edgecolor=MUTED, linewidth=1.0, zorder=2))
+        if max(abs(v) for v in velocity) > ROUNDING:
+            arrow(axes, center, [scale * v for v in velocity], color=color, width=1.8, head=10.0)
+
+
+def _kept(axes: Any, place: tuple[float, float], change: float, kept: str = "kept", **how: Any) -> None:
+    """Write that a quantity is kept, or its relative change."""
+    if abs(change) < ROUNDING:
+        note(axes, place, kept, color=INK, **how)
+    else:
+        what = "momentum " if kept != "kept" else ""
+        note(axes, place, f"{what}changed ×{change:.2g}", color=FORCE, fontweight="bold", **how)
+
+
+def _bernoulli(found: Sequence[Outcome]) -> str:
+    half, columns = 0.75**0.5, -(-len(found) // 2)
+    centers = ((0.0, 0.0), (2 * _RADIUS * half, _RADIUS), (2 * _RADIUS * half, -_RADIUS))
+    frames = [(k % columns / columns, 0.5 * (1 - k // columns), 1.0 / columns, 0.5) for k in range(len(found))]
+    with Plot("linked-impacts-bernoulli", (8.6, 4.3), bare=True, frames=frames) as plot:
+        for axes, outcome in zip(plot.each, found, strict=True):
+            axes.set(xlim=(-2.0, 3.2), ylim=(-1.9, 2.1), aspect="equal")
+            _balls(axes, centers, outcome.velocity, outcome.look.color, 1.6)
+            note(axes, (0.6, 1.65), _label(outcome).replace(": ", ":\n"), color=outcome.look.color, fontsize=8.5)
+            _kept(axes, (0.6, -1.6), outcome.momentum, "all kept", fontsize=8.5)
+    return plot.svg
+
+
+def _last_ball(numbers: Table) -> str:
+    series: dict[tuple[str, str], list[Outcome]] = {}
+    for problem in dict.fromkeys(numbers.column("problem")):
+        for outcome in outcomes(numbers, problem) if problem.startswith("cradle") else ():
+            # the LCP is as simultaneous with all rows, per-body with all rows as with the approaching ones
+            if "LCP" not in outcome.rows and not ("per-body" in outcome.treatment and "all" in outcome.rows):
+                series.setdefault(outcome[:2], []).append(outcome)
+    with Plot("linked-impacts-last") as plot:
+        for (treatment, rows), found in series.items():
+            look, values = found[0].look, [outcome.velocity[-1][0] for outcome in found]
+            plot.curve(zip([len(outcome.velocity) for outcome in found], values, strict=True), look)
+            words = rows.removesuffix(" contacts").removesuffix(" along the row")
+            mine = "per-body rows" if "per-body" in treatment else words
+            falling = 0.1 < values[-1] < values[0]  # its name stands clear of it below
+            lift = (0, -9) if "per-body" in treatment or falling else (0, 8)
+            note(plot.axes, (len(found[-1].velocity), values[-1]), mine, lift, ha="right", color=look.color, fontsize=8)
+        plot.axes.set(xlabel="balls in the cradle", ylabel="velocity of the last ball [m/s]", ylim=(-0.18, 1.2))
+    return plot.svg

@@ -1,18 +1,35 @@
-"""One panel with axes. All curves, scatter plots and maps of the report are drawn with it."""
+"""One drawing: axes in the report's style, pictures of scenes in the plane, and the SVG, the same bytes each time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import io
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
-from reports.figures.labels import name_curves
+import numpy as np
+
+from reports.figures.geometry import Floats, body_outlines, body_placements, wall_outlines, widened
+from reports.figures.labels import name_curves, note_beside
 from reports.figures.numbers import power_of_ten
-from reports.figures.style import PANEL, LineStyle, line_arguments, styled
-from reports.figures.svg import to_svg
+from reports.figures.style import (
+    FORCE,
+    INK,
+    MUTED,
+    PANEL,
+    PARAMETERS,
+    PEG,
+    VARIABLES,
+    WALL,
+    LineStyle,
+    css,
+    line_arguments,
+)
 
 TIME, PATH = "time", "path"  # the cursor reads curves over time
 TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
+LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
 
 
 class Plot:
@@ -23,42 +40,46 @@ class Plot:
     key : key of the panel, unique in the page; the identifiers of its SVG contain it
     size : width and height [inches]
     kind : TIME or PATH if the page's script reads values from the curves
-    frame : position of the axes in the drawing (left, bottom, width, height); by default the layout decides
     bare : whether to hide the axes: a canvas for shapes, by default as large as the drawing
+    shape : rows and columns of axes, placed by the layout
+    frames : places of the axes in the drawing (left, bottom, width, height), instead of a layout
 
     Attributes
     ----------
-    axes, drawing : matplotlib's axes and figure
+    axes, each, drawing : matplotlib's (first) axes, all of them, and the figure
     words : text after the name of each curve
     svg : the SVG of the panel
     """
 
     def __init__(self, key: str, size: tuple[float, float] = PANEL, *, kind: str = "", bare: bool = False,
-                 frame: tuple[float, float, float, float] | None = None) -> None:  # fmt: skip
-        self.key, self.size, self.kind, self.bare = key, size, kind, bare
-        self.frame = (0.0, 0.0, 1.0, 1.0) if bare and frame is None else frame
+                 shape: tuple[int, int] = (1, 1), frames: Sequence[Sequence[float]] = ()) -> None:  # fmt: skip
+        self.key, self.size, self.kind, self.bare, self.shape = key, size, kind, bare, shape
+        self.frames = frames or ([(0.0, 0.0, 1.0, 1.0)] if bare else [])
         self.svg = ""
         self.words: dict[str, str] = {}
         self.drawing: Any
         self.axes: Any
 
     def __enter__(self) -> Plot:
-        self._style = styled()
-        new_figure = self._style.__enter__()
-        if self.frame is None:
-            self.drawing = new_figure(figsize=self.size, layout="constrained")
-            self.axes = self.drawing.add_subplot()
-        else:
-            self.drawing = new_figure(figsize=self.size)
-            self.axes = self.drawing.add_axes(self.frame)
+        import matplotlib
+        from matplotlib.figure import Figure
+
+        self._style = matplotlib.rc_context(PARAMETERS)
+        self._style.__enter__()
+        self.drawing = Figure(figsize=self.size, dpi=72, layout=None if self.frames else "constrained")
+        self.each = ([self.drawing.add_axes(frame) for frame in self.frames] if self.frames else
+                     list(self.drawing.subplots(*self.shape, squeeze=False).ravel()))  # fmt: skip
+        self.axes = self.each[0]
         if self.bare:
-            self.axes.set_axis_off()
+            for axes in self.each:
+                axes.set_axis_off()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:  # fmt: skip
         if error is None:
-            name_curves(self.axes, self.words)
+            if len(self.each) == 1:
+                name_curves(self.axes, self.words)
             self.svg = self._traced() if self.kind else to_svg(self.drawing, self.key)
         self._style.__exit__(kind, error, trace)
 
@@ -95,10 +116,136 @@ class Plot:
 
     def log(self, x: str, y: str, scales: str = "xy", **limits: Any) -> None:
         """Name the axes and make those in `scales` logarithmic, with powers of ten as plain text."""
-        from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+        from matplotlib.ticker import LogLocator, NullLocator
 
         self.axes.set(**{f"{axis}scale": "log" for axis in scales}, xlabel=x, ylabel=y, **limits)
         for axis in (axis for axis in (self.axes.xaxis, self.axes.yaxis) if axis.get_scale() == "log"):
             axis.set_major_locator(LogLocator(numticks=7))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+            axis.set_major_formatter(lambda value, _: power_of_ten(value))
             axis.set_minor_locator(NullLocator())
+
+    def ticks(self, axis: str, values: Iterable[float], form: str = "{:g}") -> None:
+        """Write numbers at the places on "x" or "y" that are in view."""
+        low, high = sorted(getattr(self.axes, f"get_{axis}lim")())
+        shown = [value for value in values if low <= value <= high]
+        getattr(self.axes, f"set_{axis}ticks")(shown, [form.format(value) for value in shown])
+
+
+# Pictures of scenes: equal scales, no axes, filled walls and bodies; lengths are in metres
+
+
+class Canvas(Plot):
+    """A panel without axes that shows at least the rectangle from `low` to `high`, at equal scales.
+
+    Without a `size` the panel has the standard width and the proportions of the rectangle. A picture that is `turned`,
+    by 180 degrees, has x to the left and y down.
+    """
+
+    def __init__(self, key: str, low: Floats, high: Floats, size: tuple[float, float] | None = None, *,
+                 turned: bool = False) -> None:  # fmt: skip
+        width, height = high - low
+        super().__init__(key, size or (PANEL[0], PANEL[0] * height / width), bare=True)
+        (left, bottom), (right, top) = widened(low, high, self.size[0] / self.size[1])
+        self.limits = {"xlim": (right, left), "ylim": (top, bottom)} if turned else {
+            "xlim": (left, right), "ylim": (bottom, top)}  # fmt: skip
+
+    def __enter__(self) -> Canvas:
+        super().__enter__()
+        self.axes.set(**self.limits)
+        return self
+
+    def walls(self, scene: Mapping[str, Any], reach: float = 1.0) -> None:
+        """Fill the static world."""
+        for corners in wall_outlines(scene, reach):
+            self.axes.fill(*corners.T, facecolor=WALL, edgecolor="none", zorder=1)
+
+    def bodies(self, scene: Mapping[str, Any], pose: Floats | None = None, *, color: str = PEG, edge: str = INK,
+               width: float = 1.1) -> None:  # fmt: skip
+        """Fill the moving bodies at a `pose` of a run, by default at the start of the scene."""
+        for corners in body_outlines(scene, pose):
+            self.axes.fill(*corners.T, facecolor=color, edgecolor=edge, linewidth=width, zorder=2)
+
+    def hand(self, scene: Mapping[str, Any], pose: Floats | None, length: float,
+             flat: Callable[[Any], Floats] = lambda point: np.asarray(point, dtype=float)[:2]) -> None:  # fmt: skip
+        """Draw the hand's force as an arrow of the given length [m] from the point that it holds; call it last."""
+        if scene["hand"] and np.any(force := flat(scene["hand"]["force"][:3])):
+            start = flat(body_placements(scene, pose)[scene["hand"]["body"]].of(scene["hand"]["point"]))
+            self.named_arrow(start, length * force / np.hypot(*force), "hand")
+
+    def named_arrow(self, start: Floats, vector: Floats, name: str) -> None:
+        """Draw an arrow and its name, which is placed where nothing is drawn yet."""
+        arrow(self.axes, start, vector)
+        note_beside(self.axes, start, start + vector, name, 9, color=FORCE)
+
+    def scale_bar(self, start: tuple[float, float], length: float, text: str) -> None:
+        """Draw a scale bar to the right of `start`, with its text above it."""
+        right = np.sign(np.subtract(*self.axes.get_xlim()[::-1]))
+        ends = np.array([start, (start[0] + right * length, start[1])])
+        self.axes.plot(*ends.T, color=MUTED, linewidth=1.4, solid_capstyle="butt", zorder=7)
+        note(self.axes, ends.mean(axis=0), text, (0, 6), color=MUTED, fontsize=8.5)
+
+
+def arrow(axes: Any, tail: Any, vector: Any, *, color: str = FORCE, width: float = 1.6, head: float = 9.0) -> None:
+    """Draw an arrow from `tail` along `vector`."""
+    axes.annotate("", xy=tuple(np.add(tail, vector)), xytext=tuple(tail), zorder=6,
+                  arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": width, "mutation_scale": head,
+                              "shrinkA": 0, "shrinkB": 0})
+
+
+def note(axes: Any, point: Any, text: str, offset: tuple[float, float] = (0.0, 0.0), **how: Any) -> None:
+    """Write text at a point, moved by `offset` [points]."""
+    how = {"fontsize": 9, "ha": "center", "va": "center", "zorder": 7, **how}
+    axes.annotate(text, tuple(point), xytext=offset, textcoords="offset points", **how)
+
+
+# SVG: without date and metadata; coordinates rounded to 0.01 pt, colours as variables of the page, text as text
+
+_NUMBER, _COMMAND = re.compile(r"-?\d+\.\d{3,}"), re.compile(r"\s*([MLCQz])\s*")
+_MARKERS = r"(?:<use [^>]*/>)+</g>"
+
+
+def _clipped_once(run: re.Match[str]) -> str:
+    group = f'<g clip-path="{run.group(1)}">'
+    return group + run.group().replace(group, "").replace("</g>", "") + "</g>"
+
+
+def _styled_once(run: re.Match[str]) -> str:
+    style = f' style="{run.group(1)}"'
+    return f"<g{style}>{run.group().replace(style, '')}</g>"
+
+
+_CLEANED: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
+    # a <style> would leak into the page
+    (r"(?s)(?:<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>)\s*", ""),
+    (r'\sid="(curve|name)=([^"]*)"', r' data-\1="\2"'),  # what a gid tells the page's script
+    # coordinates are inside of tags; the numbers between them are for people
+    (r"<[^>]+>", lambda tag: _NUMBER.sub(lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])),
+    (r'\stransform="rotate\(-?0 [^)]*\)"', ""),
+    (r'\sd="[^"]*"', lambda path: " " + _COMMAND.sub(r"\1", path[0].strip())),  # letters part the numbers of a path
+    (r">\s+<", "><"),
+    (rf'<g clip-path="([^"]*)">{_MARKERS}(?:<g clip-path="\1">{_MARKERS})+', _clipped_once),
+    (r'<use [^>]*? style="([^"]*)"/>(?:<use [^>]*? style="\1"/>)+', _styled_once),
+    (r"'DejaVu Sans'[^;\"]*", "var(--sans, sans-serif)"),
+    ("|".join(VARIABLES), lambda color: css(color[0])),
+)
+
+
+def to_svg(drawing: Any, key: str) -> str:
+    """Return the figure as one `<svg>` element; `key` makes its identifiers unique in the page.
+
+    The page sets the size, up to LARGEST_ENLARGEMENT; the viewBox keeps the proportions.
+    """
+    buffer = io.StringIO()
+    drawing.savefig(buffer, format="svg", bbox_inches=None,
+                    metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))  # fmt: skip
+    head, text = buffer.getvalue().split("<svg", 1)[1].split(">", 1)
+    head = re.sub(r'\s(?:width|height|version|xmlns:xlink)="[^"]*"', "", head)
+    widest = LARGEST_ENLARGEMENT * round(96 * drawing.get_size_inches()[0])
+    text = (f'<svg{head} xmlns:xlink="http://www.w3.org/1999/xlink" style="max-width: {widest:.0f}px">'
+            f"{text}")
+    for pattern, new in _CLEANED:
+        text = re.sub(pattern, new, text)
+    referred = dict.fromkeys(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
+    names = {old: f"{key}-{number}" for number, old in enumerate(referred)}
+    text = re.sub(r'\sid="([^"]+)"', lambda id: f' id="{names[id[1]]}"' if id[1] in names else "", text)
+    return re.sub(r'(url\(#|href="#)([^)"]+)', lambda link: link[1] + names[link[2]], text).strip()

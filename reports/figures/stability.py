@@ -21,19 +21,13 @@ _LOOP = ("rate", "sensors", "device damping")
 _SETTLES = "+"
 
 
-@recipe(
-    "stability-map", "Walls that come to rest", "stability/maps", "stability/dampings", section="stability",
-    caption="Each mark is a wall: stiffness grows to the right, damping upwards, and the lowest row has no damping. "
-    "Look for the blue rings: walls that are stable only with impulses, mostly stiff ones with little damping. No "
-    "mark: the wall is stable with neither law. Walls under the dashed line are passive for every hand; with an "
-    "undamped device no wall is.",
-)  # fmt: skip
+@recipe("stability-map", "stability/maps", "stability/dampings")
 def stability_map(table: Table, dampings: Table) -> Drawn:
     """Draw one panel per loop."""
     damping = np.array(dampings.column("damping"))
-    panels = tuple(_walls(number, loop, table.where(**dict(zip(_LOOP, loop, strict=True))), damping)
-                   for number, loop in enumerate(dict.fromkeys(table.select(_LOOP).rows)))  # fmt: skip
-    return Drawn(panels, table, (*_HOLDS.items(), ("b = KT/2 + B", BOUND)))
+    panels = [_walls(number, loop, table.where(**dict(zip(_LOOP, loop, strict=True))), damping)
+              for number, loop in enumerate(dict.fromkeys(table.select(_LOOP).rows))]  # fmt: skip
+    return Drawn(panels, table, _HOLDS | {"b = KT/2 + B": BOUND})
 
 
 def _walls(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray) -> Panel:
@@ -59,12 +53,7 @@ _LAWS = {"penalty": STYLES["penalty"], "impulses": STYLES["impulses"]}
 _FELT = ("rate-hardness", "settles after", "penetration")
 
 
-@recipe(
-    "hardness", "How hard a wall feels", "stability/hardness", section="stability",
-    caption="A device without damping at 512 Hz with ideal sensors; walls with the paper's damping of 50 N s/m. "
-    "Perceived hardness depends on the first rise of the force (rate-hardness). With impulses it does not depend on "
-    "the wall's stiffness. Where a curve ends, the mass never comes to rest.",
-)  # fmt: skip
+@recipe("hardness", "stability/hardness")
 def hardness(table: Table) -> Drawn:
     """Draw three panels over the stiffness."""
     labels = {column.key: column.title for column in table.columns}
@@ -77,4 +66,4 @@ def hardness(table: Table) -> Drawn:
                 plot.curve([(stiffness, value) for stiffness, value in rows if value is not None], look)
             plot.log("stiffness [N/m]", labels[key])
         panels.append(Panel(plot.svg, f"{labels[key]} against stiffness, penalties and impulses.", labels[key]))
-    return Drawn(tuple(panels), table, tuple(_LAWS.items()))
+    return Drawn(panels, table, _LAWS)

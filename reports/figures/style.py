@@ -6,8 +6,7 @@ grey print can be read. The page maps each colour to a variable, so that dark mo
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
@@ -117,7 +116,7 @@ CYCLE = (
     LineStyle(PURPLE, ">", (8, 2, 1, 2)),
 )
 
-_PARAMETERS: Any = {
+PARAMETERS: Any = {
     "svg.hashsalt": "iapb", "svg.fonttype": "none", "path.simplify": True, "path.simplify_threshold": 0.15,
     "font.family": ["DejaVu Sans"], "font.size": 9.0, "axes.labelsize": 9.0, "xtick.labelsize": 8.5,
     "ytick.labelsize": 8.5, "axes.titlesize": 9.5, "axes.titleweight": "normal", "axes.titlelocation": "left",
@@ -144,16 +143,6 @@ def looks_of(names: Iterable[str]) -> dict[str, LineStyle]:
 def numbered(number: int, name: str = "") -> LineStyle:
     """Return the style of a numbered series; when the colours repeat, markers are hollow."""
     return replace(CYCLE[number % len(CYCLE)], filled=number < len(CYCLE), name=name)
-
-
-@contextmanager
-def styled() -> Iterator[Any]:
-    """Yield matplotlib's figure module (without pyplot) with the report's parameters; the caller's are restored."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(_PARAMETERS):
-        yield Figure
 
 
 def line_arguments(style: LineStyle, *, marked: bool = True) -> dict[str, Any]:

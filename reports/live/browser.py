@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from reports.figures.canvas import is_turned
-from reports.figures.geometry import extent, is_spatial, solids
+from reports.figures.geometry import extent, is_spatial, is_turned, solids
 from reports.live.window import Window
 
 Floats = NDArray[np.float64]

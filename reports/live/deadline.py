@@ -2,7 +2,7 @@
 
 A tick that ends after the next one is due misses its deadline. Then the next tick begins at once, and all later ticks
 are postponed by the same delay. So no step is left out, and two steps never run in the time of one, which the hand
-would feel as a jerk. Instead, simulated time falls behind the clock, and `Timetable.behind` records by how much.
+would feel as a jerk. Instead, simulated time falls behind the clock, and `Pace.behind` says by how much.
 
 To wait for an instant, the clock sleeps until shortly before it, and then polls the time.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,44 +44,14 @@ class Timetable(NamedTuple):
         return self.rows[:, 0]
 
     @property
-    def start(self) -> Floats:
-        """Return when each tick (n,) began [s]."""
-        return self.rows[:, 1]
-
-    @property
-    def end(self) -> Floats:
-        """Return when the work of each tick (n,) was done [s]."""
-        return self.rows[:, 2]
-
-    @property
     def budget(self) -> NDArray[np.int64]:
         """Return how many rows an impact of each step (n,) could use."""
         return self.rows[:, 3].astype(np.int64)
 
     @property
-    def wrench(self) -> Floats:
-        """Return the wrench (n, 6) of the hand in each step [N, N m]."""
-        return self.rows[:, 4:]
-
-    @property
-    def work(self) -> Floats:
-        """Return the duration of each tick's work (n,) [s]."""
-        return self.end - self.start
-
-    @property
-    def lateness(self) -> Floats:
-        """Return the delay of each tick's start (n,) [s], which the operating system and other programs cause."""
-        return self.start - self.due
-
-    @property
     def missed(self) -> NDArray[np.bool_]:
         """Return whether each tick (n,) ended after the next one was due."""
-        return self.end > self.due + self.period
-
-    @property
-    def behind(self) -> float:
-        """Return the total time [s] by which simulated time fell behind the clock."""
-        return float((self.end - (self.due + self.period))[self.missed].sum())
+        return self.rows[:, 2] > self.due + self.period
 
 
 @dataclass(frozen=True)
@@ -121,11 +91,12 @@ class Tally:
         self._collisions += len(given)
         self._least = int(given.min(initial=self._least))
         self._scene, self._period, self._ticks = run.scene_name, table.period, self._ticks + len(table.rows)
-        for k, seconds in enumerate((table.work, table.lateness)):
+        _, start, end = table.rows[:, :3].T
+        for k, seconds in enumerate((end - start, start - table.due)):
             self._counts[k] += np.bincount(np.searchsorted(_EDGES, seconds), minlength=len(_EDGES) + 1)
             self._worst[k] = seconds.max(initial=self._worst[k])
         self._missed += int(table.missed.sum())
-        self._behind += table.behind
+        self._behind += float((end - (table.due + table.period))[table.missed].sum())
 
     def pace(self) -> Pace:
         """Return the numbers of all parts."""
@@ -144,20 +115,8 @@ class Tally:
 SPIN_SECONDS = 1e-4
 
 
-class Clock(Protocol):
-    """The interface of a clock, which tells the time and waits; tests use their own clock."""
-
-    def now(self) -> float:
-        """Return the time [s]; it never goes back."""
-        ...
-
-    def wait_until(self, instant: float) -> None:
-        """Return at `instant` [s], or at once if it has passed."""
-        ...
-
-
-class MonotonicClock:
-    """CLOCK_MONOTONIC: it is the same in all processes of this machine, and it cannot be set."""
+class Clock:
+    """CLOCK_MONOTONIC: the same in all processes of this machine, and it cannot be set; tests use their own clock."""
 
     def now(self) -> float:
         """Return the time [s] since some fixed instant."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from iapb.errors import ArgumentError, IapbError
-from iapb.haptics.device import Device, SimulatedDevice
+from iapb.haptics.device import SimulatedDevice
 from iapb.scene import Scene
 from iapb.simulation import Simulation
 from iapb.system import System
-from reference.worlds import World
+from iapb.worlds import World
 from reports.by_name import function_named
 
 
@@ -19,42 +19,27 @@ def live_simulation(scene: Scene, world: World, rate: float, device: str = "") -
     Parameters
     ----------
     scene : Scene; its own rate is replaced.
-    world : law and coupling, see `reference.worlds`.
+    world : law and coupling, see `iapb.worlds`.
     rate : float [1/s]
     device : ``module:factory`` of a user's device, ``simulated``, or empty for the compiled device.
-    """
-    scene = scene.with_values({"rate": rate})
-    made = made_device(device, scene)
-    try:
-        return Simulation(scene, world.law, world.coupling_in(scene), made)
-    except IapbError:
-        raise
-    except Exception as error:
-        if made is None:
-            raise
-        raise IapbError(f"the device failed at its first reading: {type(error).__name__}: {error}") from error
-
-
-def made_device(name: str, scene: Scene) -> Device | None:
-    """Return the device that ``module:factory`` makes for a scene; None for an empty name.
 
     Raises
     ------
     ArgumentError
-        There is no such factory, or it does not return a device.
+        There is no such factory, it does not return a device, or the device fails at its first reading.
     """
-    if not name:
-        return None
-    make = simulated_device if name == "simulated" else function_named(
-        "--device", name, "module:factory, such as my_lab.omega:connect, or simulated")  # fmt: skip
+    scene = scene.with_values({"rate": rate})
+    form = "module:factory, such as my_lab.omega:connect, or simulated"
+    make = simulated_device if device == "simulated" else device and function_named("--device", device, form)
     try:
-        device: Device = make(scene)
+        return Simulation(scene, world.law, world.coupling_in(scene), make(scene) if make else None)
     except IapbError:
         raise
     except Exception as error:  # a device of somebody's own
+        if not make:
+            raise
         why = f"{type(error).__name__}: {error}"
-        raise ArgumentError("--device", name, f"a factory that makes a device of a scene ({why})") from error
-    return device
+        raise ArgumentError("--device", device, f"a factory of a device that can be read ({why})") from error
 
 
 def simulated_device(scene: Scene) -> SimulatedDevice:

@@ -6,8 +6,8 @@
         begin the next step: compute coupling and contact law, send the force to the device
         publish the coordinates for the viewer
 
-The loop never waits for a lock or for the viewer. Python's garbage collector is off during the loop. The log is written
-when enough time is left before the next tick, or when too many chunks are waiting.
+The loop never waits for a lock or for the viewer. Python's garbage collector is off during the loop. A part is written
+(`reports.store.parts`) when enough time is left before the next tick, or when too many chunks are waiting.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,26 +28,17 @@ from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.simulation import INTERRUPTED, Simulation
 from reports.live.budget import RowBudget
-from reports.live.deadline import TICK_COLUMNS, Clock, MonotonicClock, Timetable
-from reports.store.logs import RunLog
+from reports.live.deadline import TICK_COLUMNS, Clock, Timetable
+from reports.store.parts import Parts
+
+if TYPE_CHECKING:
+    from reports.live.viewer import Viewer
 
 Floats = NDArray[np.float64]
 
 _SPARE_SECONDS = 4e-4  # [s] a chunk is allocated in advance only if this much of the period is left
-_LOG_SECONDS = 7e-4  # [s] a chunk is written if this much of the period is left
+_WRITE_SECONDS = 7e-4  # [s] a chunk is written if this much of the period is left
 _MOST_WAITING = 8  # or if more chunks than this are waiting
-
-
-class Audience(Protocol):
-    """The interface of a viewer that may also pull the hand; its methods must return at once in any case."""
-
-    def publish(self, q: Floats) -> None:
-        """Publish the coordinates q."""
-        ...
-
-    def pull(self, now: float) -> Floats:
-        """Return the wrench (6,) [N, N m] of the hand, world axes, at the held point."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -68,15 +59,15 @@ class Loop:
     ticks : largest number of ticks.
     clock : default: the clock of this machine.
     budget : computes the row budget from the time left; None: impacts use all rows.
-    audience : the viewer; None: no viewer.
-    log : receives the record during the loop (`stream`); None: the record stays in memory (`run`).
+    audience : the viewer, whose `publish` and `pull` return at once in any case; None: no viewer.
+    parts : receive the record during the loop (`stream`); None: the record stays in memory (`run`).
     """
 
     def __init__(self, simulation: Simulation, ticks: int, clock: Clock | None = None,
-                 budget: RowBudget | None = None, audience: Audience | None = None, log: RunLog | None = None) -> None:
+                 budget: RowBudget | None = None, audience: Viewer | None = None, parts: Parts | None = None) -> None:
         self.simulation, self.ticks, self.budget, self.audience = simulation, ticks, budget, audience
-        self.clock: Clock = MonotonicClock() if clock is None else clock
-        self._tape = Tape(simulation, ticks, log)
+        self.clock = Clock() if clock is None else clock
+        self._tape = Tape(simulation, ticks, parts)
         self._first = self._due = 0.0  # when the first tick was due, and when the next one is
         self._under_way = False  # between the two halves of a step
         self._interrupted = False
@@ -92,10 +83,10 @@ class Loop:
         return self._tape.run(world, self._paced())
 
     def stream(self) -> str:
-        """Run all ticks like `run`, but write them to the log; return why the loop stopped early, "" if it did not."""
+        """Run all ticks like `run`, but write them to parts; return why the loop stopped early, "" if it did not."""
         stopped = self._paced()
         try:
-            self._tape.write_log(all_of_it=True)
+            self._tape.write_parts(all_of_it=True)
         except RunFileError as error:
             return stopped or str(error)
         return stopped
@@ -146,8 +137,8 @@ class Loop:
             self.budget.learn(end - start, int(log.rank[: log.logged[0]].sum()))
         if tape.wants_spare and self.clock.now() + _SPARE_SECONDS < self._due:
             tape.make_spare()
-        elif tape.wants_log and self.clock.now() + _LOG_SECONDS < self._due:
-            tape.write_log()
+        elif tape.has_waiting and self.clock.now() + _WRITE_SECONDS < self._due:
+            tape.write_parts()
 
     def _finish(self) -> None:
         """End the current step and record it."""
@@ -187,11 +178,11 @@ class Tape:
     ----------
     simulation : in its initial state.
     steps : largest number of steps.
-    log : receives the full chunks; None: the tape keeps them.
+    parts : receive the full chunks; None: the tape keeps them.
     """
 
-    def __init__(self, simulation: Simulation, steps: int, log: RunLog | None = None) -> None:
-        self._simulation, self._total, self._log = simulation, steps, log
+    def __init__(self, simulation: Simulation, steps: int, parts: Parts | None = None) -> None:
+        self._simulation, self._total, self._parts = simulation, steps, parts
         self._recorder, self._held = Recorder(simulation), list[Floats]()  # the ticks of each chunk of the recorder
         self._line = 0
         self._spare: tuple[Any, Floats] | None = None
@@ -242,19 +233,19 @@ class Tape:
         self._recorder.keep(self._record, self._line, float((ticks[:, 2] - ticks[:, 1]).sum()))
         self._held.append(ticks)
         self._line = 0
-        if self.wants_log and len(self._held) > _MOST_WAITING:
-            self.write_log()
+        if self.has_waiting and len(self._held) > _MOST_WAITING:
+            self.write_parts()
 
     @property
-    def wants_log(self) -> bool:
-        """Return whether a full chunk is waiting to be written to the log."""
-        return self._log is not None and bool(self._held)
+    def has_waiting(self) -> bool:
+        """Return whether a full chunk is waiting to be written."""
+        return self._parts is not None and bool(self._held)
 
-    def write_log(self, *, all_of_it: bool = False) -> None:
-        """Write the oldest waiting chunk to the log; with `all_of_it` all chunks, including the unfinished one."""
+    def write_parts(self, *, all_of_it: bool = False) -> None:
+        """Write the oldest waiting chunk as a part; with `all_of_it` all chunks, including the unfinished one."""
         if all_of_it:
             self._keep()
-        while self.wants_log:
-            self._log.write_chunk(*self._recorder.chunks.pop(0), (self._held.pop(0),))  # type: ignore[union-attr]
+        while self.has_waiting:
+            self._parts.write(*self._recorder.chunks.pop(0), self._held.pop(0))  # type: ignore[union-attr]
             if not all_of_it:
                 break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,15 @@ from iapb.haptics.device import DeviceReading
 from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.simulation import Simulation
-from reports.live.deadline import TICK, TICK_COLUMNS, Pace, Tally, Timetable
+from reports.live.deadline import TICK, Pace, Tally, Timetable
 from reports.live.loop import LiveRun, Tape, name_of
+from reports.provenance import collect_provenance
 from reports.resimulate import coupling_of, law_of, scene_of
-from reports.store.io import mark_store
-from reports.store.logs import LOG_SUFFIX, RunLog, read_log
-from reports.store.runs import read_run, store_parts
-from reports.store.tables import Column, Table, growing_table, read_tables
-from reports.streaming import log_head, log_of, parts_of, simulation_of
+from reports.store.io import mark_store, new_file
+from reports.store.parts import Parts, parts_of, read_head
+from reports.store.runs import read_run, store_run
+from reports.store.tables import append_columns, read_columns, write_head
+from reports.streaming import joined, parts_head, simulation_of
 
 _COMPILED = "compiled"
 
@@ -29,67 +30,66 @@ def _timetable_of(run: Path) -> Path:
     return run.with_name(run.stem + "-timetable.h5")
 
 
-def open_log(folder: Path, name: str, simulation: Simulation, world: str, ticks: int) -> RunLog:
-    """Return the log of a live run that will become ``name.h5``; mark the folder as a store, so that repair works."""
+def open_parts(folder: Path, name: str, simulation: Simulation, world: str, ticks: int) -> Parts:
+    """Return the parts of a live run that will become ``name.h5``; mark the folder as a store, so that repair works."""
     mark_store(folder)
     start = {name: values.tolist() for name, values in Recorder(simulation).start.items()}
     more = {"device": name_of(simulation.link), "period": simulation.system.dt, "start": start}
-    return RunLog(log_of(folder / f"{name}.h5"), log_head(simulation, world, ticks, live=more))
+    return Parts(parts_of(folder / f"{name}.h5"), parts_head(simulation, world, ticks, live=more), synced=False)
 
 
-def finish_live(log: Path, stopped: str, ticks: int = 0) -> tuple[Path, Path, Pace]:
-    """Write the run and the timetable in a log to their files, in constant memory; return both and the measured pace.
+def finish_live(folder: Path, stopped: str, ticks: int = 0) -> tuple[Path, Path, Pace]:
+    """Write the run and the timetable in parts to their files, in constant memory; return both and the measured pace.
 
     Raises
     ------
     RunFileError
-        The log has fewer complete ticks than `ticks`.
+        The parts have fewer complete ticks than `ticks`.
     """
-    head, _ = read_log(log)
+    head = read_head(folder)
     told, rows, tally = head["live"], list[Any](), Tally()
     period = float(told["period"])
-    joiner = Recorder(simulation_of(head))
-    joiner.start = {name: np.array(values, np.float64) for name, values in told["start"].items()}
-    path = log.with_name(log.name.removesuffix(LOG_SUFFIX))
+    recorder = Recorder(simulation_of(head))
+    recorder.start = {name: np.array(values, np.float64) for name, values in told["start"].items()}
+    path = folder.with_suffix("")
 
-    def parts(append: Callable[[Table], None]) -> Iterator[Run]:
-        for part in parts_of(log, joiner, str(head["world"]), ticks, TICK_COLUMNS, rows):
+    def pieces(group: Any) -> Iterator[Run]:
+        for piece in joined(folder, recorder, str(head["world"]), ticks, rows):
             timetable = Timetable(period, np.concatenate(rows))
             rows.clear()
-            append(ticks_table(timetable, path.name))
-            tally.add(part, timetable)
-            yield part
+            append_columns(group, _columns(timetable))
+            tally.add(piece, timetable)
+            yield piece
 
-    session = Table("session", (
-        Column("period", np.array([period]), "s", "of the ticks"),
-        Column("device", (told["device"] or _COMPILED,), "1", "the device's class; compiled: simulated in the loop"),
-    ))  # fmt: skip
-    with growing_table(_timetable_of(path), (session,)) as append:
-        store_parts(path, parts(append), stopped=stopped, key="", replace=True)
+    with new_file(_timetable_of(path), replace=True, large=True) as file:
+        write_head(file, collect_provenance())
+        store_run(path, pieces(file.create_group("ticks", track_order=True)), stopped=stopped, key="", replace=True)
+        append_columns(file.create_group("session", track_order=True), [
+            ("period", "s", "of the ticks", np.array([period])),
+            ("device", "1", "the device's class; compiled: simulated in the loop", (told["device"] or _COMPILED,))])
     return path, _timetable_of(path), tally.pace()
 
 
-def is_live(log: Path) -> bool:
-    """Return whether a log belongs to a live run."""
-    return "live" in read_log(log)[0]
+def is_live(folder: Path) -> bool:
+    """Return whether parts belong to a live run."""
+    return "live" in read_head(folder)
 
 
 def read_live(path: Path | str) -> LiveRun:
     """Read a live run from its two files; `path` is the file of the run."""
-    tables = read_tables(_timetable_of(Path(path)))
-    period, device = (tables["session"][name][0] for name in ("period", "device"))
-    rows = np.column_stack([tables["ticks"][name] for name, _, _ in TICK])
-    return LiveRun(read_run(path), Timetable(float(period), rows), "" if device == _COMPILED else str(device))
+    timetable = _timetable_of(Path(path))
+    ticks, session = (read_columns(timetable, name) for name in ("ticks", "session"))
+    rows = np.column_stack([ticks[name][1] for name, _, _ in TICK])
+    period, device = float(session["period"][1][0]), str(session["device"][1][0])
+    return LiveRun(read_run(path), Timetable(period, rows), "" if device == _COMPILED else device)
 
 
-def ticks_table(timetable: Timetable, run: str) -> Table:
-    """Return a timetable as a table, one row per tick; `run` is the name of the run's file."""
-    def values(name: str, k: int) -> Any:
-        return timetable.budget if name == "budget" else timetable.rows[:, k]
-
-    columns = [Column(name, values(name, k), unit, meaning) for k, (name, unit, meaning) in enumerate(TICK)]
-    columns.insert(3, Column("missed", timetable.missed, "1", "1 where the next tick was due before"))
-    return Table("ticks", tuple(columns), title="When each step of a live run was due and done", runs=(run,))
+def _columns(timetable: Timetable) -> list[tuple[str, str, str, Any]]:
+    """Return name, unit, meaning and values of each column of a timetable."""
+    columns: list[tuple[str, str, str, Any]] = [
+        (*tick, timetable.budget if tick[0] == "budget" else timetable.rows[:, k]) for k, tick in enumerate(TICK)]
+    columns.insert(3, ("missed", "1", "1 where the next tick was due before", timetable.missed.astype(np.uint8)))
+    return columns
 
 
 class RecordedDevice:

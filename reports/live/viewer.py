@@ -77,7 +77,7 @@ class SpringHand:
 
 
 class Viewer:
-    """The `Audience` of the loop: a process that shows a simulation and lets the mouse pull the hand.
+    """A process that shows the simulation of a loop and lets the mouse pull the hand.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Viewer:
         self.process: Any = None
 
     def start(self) -> str:
-        """Start the process and return its secret address; raise IapbError if the process does not start."""
+        """Start the process and return its secret address; raise IapbError if it does not start. `close` ends it."""
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         arguments = (self.window.name, self._scene, self._port, theirs)
@@ -108,7 +108,6 @@ class Viewer:
                 return str(ours.recv())
         except EOFError:
             pass
-        self.stop()
         raise IapbError("the viewer did not start; run without --view")
 
     def publish(self, q: Floats) -> None:
@@ -116,13 +115,14 @@ class Viewer:
         self.window.publish(self._mechanism.poses(q[None], planar=False).ravel())
 
     def pull(self, now: float) -> Floats:
-        """Return the wrench (6,) of the hand: that of the scene, plus that of the mouse while it holds the handle."""
+        """Return the wrench (6,) [N, N m] of the hand at the held point, in world axes: that of the scene, plus that of
+        the mouse while it holds the handle."""
         if self._hand is None:
             return self._own
         self._target = self.window.target(now, self._target)
         return self._hand.wrench(self._target)
 
-    def stop(self) -> None:
+    def close(self) -> None:
         """End the process, by force if necessary, and release the shared memory."""
         if self.process is not None and self.process.is_alive():
             self.process.terminate()

@@ -16,9 +16,8 @@ from markupsafe import Markup
 
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
-from reports.figures.figure import Figure, NotComputed, Recipe, draw
+from reports.figures.figure import Figure, NotComputed, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, format_number, is_number
-from reports.figures.standalone import swatch
 from reports.pages.first import answer, facts
 from reports.pages.formulas import formula, prose
 from reports.pages.matrix import matrices, worst_first

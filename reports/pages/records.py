@@ -95,4 +95,5 @@ class Evidence:
     failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     manifest: tuple[StoredFile, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)  # that each stage took to compute or read
     figure_command: str = "iapb reproduce --figure {key}"

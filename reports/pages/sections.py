@@ -48,7 +48,8 @@ def _topic(group: str, id: str, title: str) -> Section:
 PAPER, ENERGY, CHECKS, TIME, DATA = "The paper", "Energy", "Is it right?", "Time and effects", "Make it again"
 SECTIONS: tuple[Section, ...] = (
     Section(PAPER, "idea", "The idea", _always),
-    Section(PAPER, "claims", "Claims ledger", lambda evidence: bool(evidence.claims), tables=("claims",)),
+    Section(PAPER, "claims", "Claims ledger", lambda evidence: bool(evidence.claims),
+            tables=("claims", "claims on the peg", "claims on times")),
     Section(PAPER, "figures", "Figures of the paper", _always, tables=("runs of the figures",)),
     Section(PAPER, "couplings", "Device and tool", _always),
     Section(ENERGY, "proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),

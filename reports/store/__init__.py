@@ -1,22 +1,13 @@
-"""Runs and tables on disk: HDF5 files that are either complete or absent, and are found by the hash of their inputs."""
+"""Runs and tables on disk: HDF5 files that are either complete or absent, and are found by the hash of their inputs.
 
-from reports.store.folder import RunStore
-from reports.store.keys import content_hash, run_key
-from reports.store.runs import RunEntry, read_provenance, read_run, write_run
-from reports.store.tables import Column, Table, read_table, read_tables, write_table, write_tables
+Each name is loaded at its first use: a run loads nothing of the verification.
+"""
 
-__all__ = [
-    "Column",
-    "RunEntry",
-    "RunStore",
-    "Table",
-    "content_hash",
-    "read_provenance",
-    "read_run",
-    "read_table",
-    "read_tables",
-    "run_key",
-    "write_run",
-    "write_table",
-    "write_tables",
-]
+from iapb.lazy import lazy_names
+
+_HOME = {
+    "RunStore": ".folder", "content_hash": ".keys", "run_key": ".keys", "RunEntry": ".runs", "read_provenance": ".runs",
+    "read_run": ".runs", "write_run": ".runs", "read_table": ".tables", "write_table": ".tables",
+}  # fmt: skip
+
+__getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

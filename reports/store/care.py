@@ -16,22 +16,22 @@ from pathlib import Path
 from iapb.errors import ArgumentError, RunFileError
 from reports.store import io
 from reports.store.folder import PARTIAL_SUFFIX
-from reports.store.io import MARK_NAME, WRITING, is_aside, is_locked, is_old, is_ours, is_store, opened
+from reports.store.io import WRITING, is_ours, opened
 from reports.store.keys import SOURCES, evidence_version, is_older_engine
-from reports.store.logs import LOG_SUFFIX, is_log, read_log
+from reports.store.parts import at_work, is_parts, read_head, remove_parts
 from reports.store.runs import opened_run, read_provenance
 from reports.store.schema import FORMAT, TABLE_FORMAT
 
 Progress = Callable[[int, int], None]
 
 DAMAGED_SUFFIX = ".damaged"
-_LOOKED_AT = (".h5", PARTIAL_SUFFIX, WRITING, DAMAGED_SUFFIX, f".h5{LOG_SUFFIX}")
+_LOOKED_AT = (".h5", PARTIAL_SUFFIX, WRITING, DAMAGED_SUFFIX)
 WHOLE, DAMAGED, PARTIAL, FOREIGN, STALE, LEFTOVER = "whole", "damaged", "partial", "foreign", "stale", "leftover"
 
 
 @dataclass(frozen=True)
 class FileState:
-    """The state of a file, and the reason for it."""
+    """The state of a file or of a folder of parts, and the reason for it."""
 
     path: Path
     state: str
@@ -39,8 +39,9 @@ class FileState:
 
     @property
     def size(self) -> int:
-        """Return the size of the file [bytes]."""
-        return self.path.stat().st_size if self.path.is_file() else 0
+        """Return the size [bytes]."""
+        files = self.path.iterdir() if self.path.is_dir() else [self.path]
+        return sum(file.stat().st_size for file in files if file.is_file())
 
 
 def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
@@ -60,15 +61,15 @@ def _files(folder: Path) -> Iterator[Path]:
     if folder.is_file():  # a file given by name is checked, whatever its suffix
         yield folder
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.name.endswith(_LOOKED_AT):
+        if is_parts(path) or (path.is_file() and path.name.endswith(_LOOKED_AT) and not is_parts(path.parent)):
             yield path
 
 
 def _state(path: Path) -> FileState:
-    if is_aside(path):
+    if io.is_aside(path):
         return FileState(path, LEFTOVER, "not whole yet: a writer is at work, or was stopped before it was done")
-    if is_log(path):
-        why = "a process is at work on it" if is_locked(path) else "iapb run --resume goes on, repair makes it readable"
+    if is_parts(path):
+        why = "a process is at work on it" if at_work(path) else "iapb run --resume goes on, repair makes it readable"
         return FileState(path, LEFTOVER, f"a run in the making: {why}")
     if path.name.endswith(WRITING) or not is_ours(path):
         return FileState(path, FOREIGN, "no file of iapb: no seal, and nothing that says so")
@@ -108,14 +109,16 @@ def stores_below(folder: Path | str) -> tuple[Path, ...]:
     ArgumentError
         There is no marked store.
     """
-    found = tuple(mark.parent for mark in sorted(Path(folder).rglob(MARK_NAME)) if is_store(mark.parent))
+    found = tuple(mark.parent for mark in sorted(Path(folder).rglob(io.MARK_NAME)) if io.is_store(mark.parent))
     if not found:
-        raise ArgumentError("where", str(folder), f"a store of iapb ({MARK_NAME}) or a folder of stores")
+        raise ArgumentError("where", str(folder), f"a store of iapb ({io.MARK_NAME}) or a folder of stores")
     return found
 
 
-def _is_whole(path: Path) -> bool:
-    return path.is_file() and is_ours(path) and _state(path).state == WHOLE
+def parts_of_killed(folder: Path | str) -> list[Path]:
+    """Return the folders of parts in stores, at and below a folder, that no process is writing."""
+    return [path for store in stores_below(folder) for path in sorted(store.iterdir())
+            if is_parts(path) and not at_work(path)]
 
 
 def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
@@ -132,7 +135,8 @@ def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[
 
 
 def garbage(folder: Path | str) -> tuple[FileState, ...]:
-    """Return the files in stores that nothing needs: leftovers, partial runs of finished runs, results of older code.
+    """Return the files in stores that nothing needs: leftovers, unfinished runs that are finished now or of older code,
+    results of older code.
 
     Results of user code (`RunStore(folder, code=…)`), results of versions that did not record their code, and files so
     young that a process may still be writing them do not belong to these.
@@ -146,25 +150,31 @@ def _garbage(store: Path) -> Iterator[FileState]:
     for path in _files(store):
         if path.parent != store or path.is_symlink():
             continue
-        if is_log(path) and is_old(path) and not is_locked(path) and (why := _useless(path)):
-            yield FileState(path, LEFTOVER, why)
-        if path.name.endswith(WRITING) or not is_ours(path):
+        name = path.name
+        if is_parts(path):
+            if io.is_old(path) and not at_work(path) and (why := _useless(path)):
+                yield FileState(path, LEFTOVER, why)
+        elif name.endswith(WRITING) or not is_ours(path):
             continue
-        if path.name.endswith(DAMAGED_SUFFIX):
+        elif name.endswith(DAMAGED_SUFFIX):
             yield _state(path)
-        elif path.name.endswith(PARTIAL_SUFFIX):
-            if is_old(path) and _is_whole(path.with_name(path.name.removesuffix(PARTIAL_SUFFIX))):
+        elif name.endswith(PARTIAL_SUFFIX):
+            if io.is_old(path) and _is_whole(path.with_suffix("")):
                 yield FileState(path, PARTIAL, "the finished run is there")
         elif kind := _stale(path):
             yield FileState(path, STALE, f"a {kind} of older code")
 
 
-def _useless(log: Path) -> str:
-    """Return why a log cannot be used to resume a run; "" if it can."""
-    if _is_whole(log.with_name(log.name.removesuffix(LOG_SUFFIX))):
-        return "the log of a run that is finished"
+def _is_whole(path: Path) -> bool:
+    return path.is_file() and is_ours(path) and _state(path).state == WHOLE
+
+
+def _useless(parts: Path) -> str:
+    """Return why a run cannot be resumed from its parts; "" if it can, or if they are damaged."""
+    if _is_whole(parts.with_suffix("")):
+        return "the parts of a run that is finished"
     with suppress(RunFileError):
-        return "the log of a run of older code" if is_older_engine(str(read_log(log)[0].get("code", ""))) else ""
+        return "the parts of a run of older code" if is_older_engine(str(read_head(parts).get("code", ""))) else ""
     return ""
 
 
@@ -181,4 +191,4 @@ def _stale(path: Path) -> str:
 def collect_garbage(found: Iterable[FileState]) -> None:
     """Remove the files that `garbage` has found."""
     for state in found:
-        io.remove_unless_locked(state.path)
+        (remove_parts if is_parts(state.path) else io.remove_unless_locked)(state.path)

@@ -11,23 +11,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.store.io import abandoned, mark_store, remove_unless_locked
 from reports.store.keys import code_label, run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
-from verification.finding import of_each
 
 PARTIAL_SUFFIX = ".partial"
 _KEY_DIGITS = 16  # 64 bits: a collision among a million runs has a probability below 1e-7; the file has all 256 bits
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """The place of a run in a store: its key, and its file."""
 
     key: str
@@ -52,8 +50,7 @@ class RunStore:
     """
 
     def __init__(self, folder: Path | str, code: str | None = None) -> None:
-        self.folder = Path(folder)
-        self.code = code
+        self.folder, self.code = Path(folder), code
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -72,22 +69,9 @@ class RunStore:
         return Place(key, path if path.is_file() else min(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"), default=path))
 
     def get_or_run(self, inputs: Mapping[str, Any], compute: Callable[[], Run], label: str = "run") -> Run:
-        """Return the run of `inputs`: read it from its file if there is one, else compute and store it.
+        """Return the run of `inputs` (everything that determines it): read it, or compute and store it.
 
-        Parameters
-        ----------
-        inputs
-            Everything that determines the run, as mappings, sequences, arrays, numbers and texts.
-        compute
-            Computes the run.
-        label
-            Start of the file's name.
-
-        Returns
-        -------
-        Run
-            It has ``complete=False`` if `compute` gave up early. Then it is stored as partial and computed again next
-            time.
+        It has ``complete=False`` if `compute` gave up early. Then it is stored as partial and computed again next time.
 
         Raises
         ------
@@ -103,12 +87,9 @@ class RunStore:
             if entry.run_key != place.key:
                 raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
             return run, entry
-        mark_store(self.folder)
         run = compute()
         if not isinstance(run, Run):
             raise ArgumentError("compute", run, "a function that returns a Run")
-        if not run.complete:
-            return run, store_run(place.partial, run, key=place.key, replace=True)
         return run, self._keep(place, run)
 
     def put(self, inputs: Mapping[str, Any], run: Run, label: str = "run") -> Path:
@@ -116,15 +97,21 @@ class RunStore:
         if not run.complete:
             raise ArgumentError("run.complete", run.complete, "True: a finished run")
         place = self.place_of(inputs, label)
-        mark_store(self.folder)
         self._keep(place, run)
         return place.path
 
     def _keep(self, place: Place, run: Run) -> RunEntry:
+        mark_store(self.folder)
+        if not run.complete:
+            return store_run(place.partial, run, key=place.key, replace=True)
         entry = store_run(place.path, run, key=place.key, code=code_label(self.code))
         place.partial.unlink(missing_ok=True)
         return entry
 
     def entries(self) -> tuple[RunEntry, ...]:
         """Return one entry per finished run in the folder, by file name; other and damaged files are left out."""
-        return tuple(of_each(sorted(self.folder.glob("*.h5")), lambda path: [read_entry(path)], []))
+        found: list[RunEntry] = []
+        for path in sorted(self.folder.glob("*.h5")):
+            with suppress(RunFileError):
+                found.append(read_entry(path))
+        return tuple(found)

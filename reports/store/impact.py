@@ -60,41 +60,36 @@ def write_broken_impact(path: Path, broken: BrokenImpact) -> Path:
 
 def impact_run(broken: BrokenImpact) -> Run:
     """Return the impact as a run that stops in the impact of its first step."""
-    case, after = broken.struck.case, broken.struck.velocity_after
-    d = case.coordinates
+    case, rows = broken.struck.case, broken.struck.rows
+    mass, before = np.asarray(case.mass_matrix, np.float64), np.asarray(case.velocity, np.float64)
+    d, k = case.coordinates, len(rows)
+    after = np.array(broken.struck.velocity_after, np.float64)
     lengths = {"time": 1, "step": 0, "step_edge": 1, "contact": 0, "axis": 3, "coordinate": 0, "velocity": d,
-               "device_coordinate": 0, "device_velocity": 0, "body": 0, "placement": 3}  # fmt: skip
+               "device_coordinate": 0, "device_velocity": 0, "body": 0, "placement": 3, "impact": k}  # fmt: skip
     none = {"coordinate_names": (), "coordinate_units": (), "body_names": (), "scene_resolved": {}, "energy": {},
             "coupling_settings": {}, "tool_dofs": (0, 0), "tool_coordinates": (0, 0), "effects": ()}  # fmt: skip
     arrays = blank((*quantities(Run, "time"), *quantities(Run, "step")), lengths)
-    arrays["v"][0] = case.velocity
+    arrays["v"][0] = before
+    with np.errstate(over="ignore", invalid="ignore"):  # a broken impact may be of any size
+        impulse = (after - before) @ mass.T
+        closing = np.sum(after @ np.asarray(case.contact_jacobian).T < 0.0, axis=1)
+    given = np.all(np.isfinite(after), axis=1)
+    impacts = ImpactTable(**blank(quantities(ImpactTable), lengths) | {
+        "v_minus": np.tile(before, (k, 1)), "v_plus": after, "impulse": impulse, "rows": np.array(rows, np.int64),
+        "rank": np.full(k, -1), "scale": np.ones(k), "clamp": np.full(k, np.nan), "friction_share": np.ones(k),
+        "energy_lost": np.array([_energy_lost(mass, before, one) if fine else np.nan
+                                 for one, fine in zip(after, given, strict=True)]),
+        "approaching": np.where(given, closing, -1), "mass_digest": np.repeat(digests(mass[None]), k)})  # fmt: skip
     return Run(scene_name=f"impact: {case.family or 'of bare numbers'}", scene_source=_SOURCE, world="no world",
                law=broken.resolver, law_settings={"restitution": np.asarray(case.given_restitution()).tolist()},
                coupling="none", dt=0.0, complete=False, stopped=broken.words(), kernel="none",
                velocity_names=tuple(f"v_{k}" for k in range(d)), velocity_units=("1",) * d, time=np.zeros(1),
-               contacts=ContactTable(**blank(quantities(ContactTable), lengths)),
-               impacts=_impacts(case, broken.struck.rows, after), **none, **arrays)  # type: ignore[arg-type]  # fmt: skip
-
-
-def _impacts(case: ImpactCase, rows: tuple[int, ...], velocity_after: Floats) -> ImpactTable:
-    """Return an impact table with one row per velocity after; the impulse is M (v⁺ − v⁻) for every resolver."""
-    k, v, after = len(rows), np.array(case.velocity, np.float64), np.array(velocity_after, np.float64)
-    with np.errstate(over="ignore", invalid="ignore"):  # a broken impact may be of any size
-        impulse = (after - v) @ np.asarray(case.mass_matrix, np.float64).T
-        closing = np.sum(after @ np.asarray(case.contact_jacobian, np.float64).T < 0.0, axis=1)
-    given = np.all(np.isfinite(after), axis=1)
-    lost = [_energy_lost(case.mass_matrix, v, one) if fine else np.nan for one, fine in zip(after, given, strict=True)]
-    return ImpactTable(
-        step=np.zeros(k, np.int64), group=np.zeros(k, np.int64), v_minus=np.tile(v, (k, 1)), v_plus=after,
-        impulse=impulse, rows=np.array(rows, np.int64), rank=np.full(k, -1, np.int64), energy_lost=np.array(lost),
-        scale=np.ones(k), clamp=np.full(k, np.nan), friction_share=np.ones(k),
-        approaching=np.where(given, closing, -1).astype(np.int64), solved=np.zeros(k, np.bool_),
-        mass_digest=np.repeat(digests(np.asarray(case.mass_matrix, np.float64)[None]), k))  # fmt: skip
+               contacts=ContactTable(**blank(quantities(ContactTable), lengths)), impacts=impacts,
+               **none, **arrays)  # type: ignore[arg-type]  # fmt: skip
 
 
 def _energy_lost(mass: Floats, before: Floats, after: Floats) -> float:
-    """Return ½ v⁻·M v⁻ − ½ v⁺·M v⁺, computed exactly and rounded once, because a gain can be as small as the rounding
-    error of either energy."""
+    """Return ½ v⁻·M v⁻ − ½ v⁺·M v⁺, computed exactly and rounded once: a gain can be as small as the rounding error."""
     a, b = ([Fraction(float(x)) for x in v] for v in (before, after))
     terms = (Fraction(float(m)) * (a[i] * a[j] - b[i] * b[j]) for (i, j), m in np.ndenumerate(mass))
     lost = sum(terms, Fraction(0)) / 2

@@ -16,7 +16,7 @@ import re
 import stat
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -32,16 +32,17 @@ _STORE: dict[str, Any] = {
     "note": "iapb store gc and repair act on the sealed files of iapb in this folder, and on nothing else",
 }  # fmt: skip
 WRITING = ".writing"  # suffix of a file that is not yet complete
-_ASIDE = re.compile(rf"\.(.+\.h5(\.partial)?|{re.escape(MARK_NAME)})\.\d+{re.escape(WRITING)}")
+_ASIDE = re.compile(rf"\.(.+\.h5(\.partial)?|\d+\.part|{re.escape(MARK_NAME)})\.\d+{re.escape(WRITING)}")
 # A write takes seconds; older temporary files were left by killed writers.
 _ABANDONED_AFTER_SECONDS = 3600.0
 
 _MARK = b"\niapb sha256 "
-_LENGTH = len(_MARK) + 64 + 1  # the mark, 64 hexadecimal digits, a newline
+SEAL = len(_MARK) + 64 + 1  # bytes: the mark, 64 hexadecimal digits, a newline
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FORMATS = (FORMAT.encode(), TABLE_FORMAT.encode())
 _KEYED = re.compile(r".+-[0-9a-f]{16}\.h5(\.\w+)?")  # a run key, and what says that a file is no complete run
-_MARK_HEAD = b'"format": "iapb store"'
+_MARK_HEAD = b'{"format": "iapb store"'
+PART_HEAD = b'{"format": "iapb part"'  # see `reports.store.parts`
 _HEAD = 1 << 16  # bytes, among which the attributes of a file are
 _BLOCK = 1 << 20
 # Chunks of about this size: small enough to look at a part, large enough to compress.
@@ -50,8 +51,8 @@ _MOST_PACKED = 1100  # largest expansion factor: deflate makes at most 1032 byte
 _UNPACKED_SMALL = 1 << 20  # bytes that any dataset may state
 
 
-def sync(path: Path) -> None:
-    """Make sure that a file, or the entries of a folder, are on the disk."""
+def _sync(path: Path) -> None:
+    """Wait until a file, or the entries of a folder, are on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -60,17 +61,19 @@ def sync(path: Path) -> None:
 
 
 @contextmanager
-def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
+def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterator[Path]:
     """Yield a temporary path to write to; afterwards move it to `target` atomically.
 
     A crash at any time leaves `target` unchanged. With ``replace=False`` a target that exists at the end is kept, and
-    the temporary file is removed: the first of two writers wins.
+    the temporary file is removed: the first of two writers wins. A file that is not `synced` may be lost, not damaged
+    unseen, by a power failure.
     """
     aside = target.with_name(f".{target.name}.{os.getpid()}{WRITING}")
     lock = _locked(aside)
     try:
         yield aside
-        sync(aside)
+        if synced:
+            _sync(aside)
         if replace:
             os.replace(aside, target)
         else:
@@ -81,7 +84,8 @@ def written_aside(target: Path, *, replace: bool) -> Iterator[Path]:
             except OSError:  # a file system without hard links
                 if not target.exists():
                     os.rename(aside, target)
-        sync(target.parent)
+        if synced:
+            _sync(target.parent)
     finally:
         aside.unlink(missing_ok=True)
         os.close(lock)
@@ -99,35 +103,28 @@ def _locked(path: Path) -> int:
 
 
 @contextmanager
-def _held(path: Path) -> Iterator[bool | None]:
-    """Lock a file, so that no process can start to write it; yield False if one does, None if it cannot be opened."""
-    try:
-        file = os.open(path, os.O_RDWR)
-    except OSError:
-        yield None
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        free = True
-    except OSError:
+def _held(path: Path) -> Iterator[bool]:
+    """Lock a file, so that no process can start to write it; yield False if one does, or if it cannot be opened."""
+    with ExitStack() as files:
         free = False
-    try:
+        with suppress(OSError):
+            file = files.enter_context(path.open("r+b"))
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            free = True
         yield free
-    finally:
-        os.close(file)
 
 
 def is_locked(path: Path) -> bool:
     """Return whether a process is writing a file and holds its lock; False if the file does not exist."""
     with _held(path) as free:
-        return free is False
+        return not free and path.exists()
 
 
 def remove_unless_locked(path: Path) -> None:
     """Remove a file if no process is writing it."""
     with _held(path) as free, suppress(OSError):
         if free:
-            path.unlink(missing_ok=True)
+            path.unlink()
 
 
 def mark_store(folder: Path) -> None:
@@ -157,29 +154,7 @@ def is_old(path: Path) -> bool:
 def abandoned(folder: Path) -> list[Path]:
     """Return the temporary files that killed writers left in a store, by name and content; not those still written."""
     found = sorted(folder.glob(f".*{WRITING}")) if is_store(folder) else []
-    return [path for path in found if is_aside(path) and _is_plain(path) and is_old(path) and not is_locked(path)
-            and _is_draft(path)]
-
-
-def _is_plain(path: Path) -> bool:
-    """Return whether a path is a regular file with this name alone: no link, pipe or folder."""
-    with suppress(OSError):
-        found = path.lstat()
-        return stat.S_ISREG(found.st_mode) and found.st_nlink == 1
-    return False
-
-
-def _is_draft(path: Path) -> bool:
-    """Return whether a temporary file is empty or begins like a run, table or mark of iapb."""
-    head = _ends(path)[0]
-    ours = _MARK_HEAD in head if path.name.startswith(f".{MARK_NAME}") else head.startswith(b"{")
-    return not head or _says_so(head) or (".h5" not in path.name and ours)
-
-
-def _says_so(head: bytes) -> bool:
-    """Return whether the head of an HDF5 file has our attributes `format` and `format_version` and one of our names."""
-    named = any(re.search(rb"(?<![ -~])" + name + rb"(?![ -~])", head) for name in _FORMATS)
-    return head.startswith(_HDF5_SIGNATURE) and b"\0format\0" in head and b"\0format_version\0" in head and named
+    return [path for path in found if is_aside(path) and is_ours(path) and is_old(path) and not is_locked(path)]
 
 
 def is_aside(path: Path) -> bool:
@@ -188,21 +163,33 @@ def is_aside(path: Path) -> bool:
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether a file is a run or table of iapb, complete or damaged, by what nobody else's file has.
+    """Return whether a file is of iapb, complete or damaged, by what nobody else's file has; links and pipes are not.
 
-    It ends with a seal or, where damage took the seal, its HDF5 head has our attribute `format` and its name a run key.
+    It ends with a seal or begins like a part. Where damage took the seal of a run or table, its HDF5 head has our
+    attributes and its name a run key. A temporary file may also be empty or begin like the mark of a store.
     """
-    if not _is_plain(path):
+    found = path.lstat()
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
         return False
-    head, end = _ends(path)
-    return end.startswith(_MARK) or (_KEYED.fullmatch(path.name) is not None and _says_so(head))
+    (head, end), aside = _ends(path), is_aside(path)
+    if end.startswith(_MARK) or head.startswith(PART_HEAD):
+        return True
+    if aside and (not head or (MARK_NAME in path.name and head.startswith(_MARK_HEAD))):
+        return True
+    return (aside or _KEYED.fullmatch(path.name) is not None) and _says_so(head)
+
+
+def _says_so(head: bytes) -> bool:
+    """Return whether the head of an HDF5 file has our attributes `format` and `format_version` and one of our names."""
+    named = any(re.search(rb"(?<![ -~])" + name + rb"(?![ -~])", head) for name in _FORMATS)
+    return head.startswith(_HDF5_SIGNATURE) and b"\0format\0" in head and b"\0format_version\0" in head and named
 
 
 def _ends(path: Path) -> tuple[bytes, bytes]:
     """Return the head of a file, and as many last bytes as a seal has."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
-        file.seek(max(path.stat().st_size - _LENGTH, 0))
+        file.seek(max(path.stat().st_size - SEAL, 0))
         return head, file.read()
 
 
@@ -216,7 +203,7 @@ def _check_seal(path: Path) -> None:
     head, mark = _ends(path)
     if not head.startswith(_HDF5_SIGNATURE):
         raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
-    size = path.stat().st_size - _LENGTH
+    size = path.stat().st_size - SEAL
     if size < 0 or not mark.startswith(_MARK):
         raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb; "
                            "iapb store repair sets damaged runs aside")
@@ -295,11 +282,10 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
                 raise RunFileError(f"{path}: format is {found!r}: expected {expected_format!r}")
             version = int(file.attrs.get("format_version", 0)) if expected_format else FORMAT_VERSION
             if version != FORMAT_VERSION:
-                other, more = "a later iapb", ""
-                if version < FORMAT_VERSION:
-                    other, more = "an earlier iapb", "; simulate the run again, it will be stored beside this file"
-                raise RunFileError(f"{path}: format version is {version}, of {other}: this one reads {FORMAT_VERSION}"
-                                   + more)
+                earlier = version < FORMAT_VERSION
+                more = "; simulate the run again, it will be stored beside this file" if earlier else ""
+                raise RunFileError(f"{path}: format version is {version}, of {'an earlier' if earlier else 'a later'} "
+                                   f"iapb: this one reads {FORMAT_VERSION}{more}")
             yield file
     except RunFileError:
         raise
@@ -360,6 +346,15 @@ def write_quantity(
     for axis, dimension in enumerate(dimensions):
         dataset.dims[axis].attach_scale(group[dimension])
     return dataset
+
+
+def group_of(file: Any, name: str, path: Path | str) -> Any:
+    """Return a group; raise RunFileError for a dataset in its place, because iterating over it might never end."""
+    import h5py
+
+    if not isinstance(file.get(name), h5py.Group):
+        raise RunFileError(f"{path}: the group {name} is missing")
+    return file[name]
 
 
 def read_values(group: Any, name: str, path: str) -> Any:

@@ -60,8 +60,7 @@ def canonical_json(value: Any) -> str:
 def code_version() -> str:
     """Return a hash of everything that can change a run's numbers.
 
-    It is a hash of sources rather than a commit, so it also distinguishes uncommitted changes and does not depend on
-    the code of the report. It is computed once per process, at the first call.
+    It is a hash of sources, not a commit: it knows uncommitted changes, and does not depend on the code of the report.
     """
     packages = [f"{package} {version(package)}" for package in _NUMERIC_PACKAGES]
     return hash_of([*packages, *(sources_hash(package) for package in _SOURCES)])
@@ -69,10 +68,12 @@ def code_version() -> str:
 
 @cache
 def evidence_version() -> str:
-    """Return a hash of everything that can change a verdict: engine, references, verification, stages and scenes."""
+    """Return a hash of everything that can change a verdict: engine, references, checks, stages, scenes and cases."""
     files = sorted(path for path in scene_folder().rglob("*") if path.is_file())
     scenes = {path.relative_to(scene_folder()).as_posix(): path.read_text(encoding="utf-8") for path in files}
-    return hash_of([code_version(), sources_hash("verification"), sources_hash("reports/evidence"), scenes])
+    cases = {path.relative_to(_ROOT).as_posix(): path.read_text(encoding="utf-8")
+             for path in sorted((_ROOT / "verification").rglob("*")) if path.suffix in (".yaml", ".xml")}  # fmt: skip
+    return hash_of([code_version(), sources_hash("verification"), sources_hash("reports/evidence"), scenes, cases])
 
 
 def hash_of(value: Any) -> str:
@@ -116,12 +117,8 @@ def code_hash(source: bytes) -> str:
 def run_key(inputs: Mapping[str, Any], code: str | None = None) -> str:
     """Return the run key: sha256 of the inputs and of the code version, in hexadecimal.
 
-    Parameters
-    ----------
-    inputs
-        Everything that determines the run: resolved scene, law, settings, coupling, duration …
-    code
-        Version of the code; by default the engine's version. Pass another version to include the code of your own law.
+    The inputs are everything that determines the run; `code` is by default the engine's version, pass another one to
+    include the code of your own law.
     """
     return hash_of({"inputs": inputs, "code": code_version() if code is None else code})
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
 from operator import index
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from reports.provenance import collect_provenance
 from reports.store.io import (
     dataset_of,
     extend,
+    group_of,
     new_file,
     opened,
     read_values,
@@ -41,8 +41,7 @@ Reader = Callable[[Any, str, str], Any]  # (group, name, path): `read_values` or
 TIME = Quantity("time", ("time",), np.float64, "s", "")
 
 
-@dataclass(frozen=True)
-class RunEntry:
+class RunEntry(NamedTuple):
     """The description of a run in its file, without arrays."""
 
     file: str  # name within the folder
@@ -76,38 +75,32 @@ def write_run(
 
 
 def store_run(
-    path: Path | str, run: Run, *, key: str, code: str = "", provenance: Mapping[str, str] | None = None,
-    replace: bool = False, more: Callable[[Any], None] | None = None,
+    path: Path | str, run: Run | Iterator[Run], *, key: str, code: str = "", stopped: str = "", replace: bool = False,
+    provenance: Mapping[str, str] | None = None, more: Callable[[Any], None] | None = None,
 ) -> RunEntry:
-    """Write one run like `write_run`, with the label of its code; return the entry of the new file."""
-    path = Path(path)
-    with new_file(path, replace=replace) as file:
-        _write_run(file, run, key, code, provenance)
-        file.attrs["content_hash"] = content_hash(run)
+    """Write one run like `write_run`, with the label of its code; return the entry of the new file.
+
+    A run may be given in consecutive pieces, which are written in constant memory to the same content; then `stopped`
+    says why it is incomplete.
+    """
+    path, large = Path(path), not isinstance(run, Run)
+    with new_file(path, replace=replace, large=large) as file:
+        if isinstance(run, Run):
+            _write_run(file, run, key, code, provenance)
+            file.attrs["content_hash"] = content_hash(run)
+        else:
+            distrust: tuple[str, ...] = ()
+            for number, piece in enumerate(run):
+                distrust = distrust or piece.distrust
+                if number == 0:
+                    _write_run(file, piece, key, code, provenance, growing=True)
+                else:
+                    _append(file, piece)
+            file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
+                               "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
+            file.attrs["content_hash"] = content_hash(_run_in(file, path, dataset_of))
         if more is not None:
             more(file)
-        return _entry(file, path)
-
-
-def store_parts(
-    path: Path | str, parts: Iterator[Run], *, stopped: str = "", key: str, code: str = "", replace: bool = False
-) -> RunEntry:
-    """Write a run that is given in consecutive parts, in constant memory; the content hash is that of the whole run.
-
-    `stopped` is the reason why the run is incomplete, or "".
-    """
-    path = Path(path)
-    with new_file(path, replace=replace, large=True) as file:
-        distrust: tuple[str, ...] = ()
-        for number, part in enumerate(parts):
-            distrust = distrust or part.distrust
-            if number == 0:
-                _write_run(file, part, key, code, None, growing=True)
-            else:
-                _append(file, part)
-        file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
-                           "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
-        file.attrs["content_hash"] = content_hash(_run_in(file, path, dataset_of))
         return _entry(file, path)
 
 
@@ -173,9 +166,7 @@ def _append(file: Any, part: Run) -> None:
 
 
 def read_run(path: Path | str) -> Run:
-    """Return the run in a file, partial or complete.
-
-    The seal is checked first and the content hash last, so a changed file is never accepted as a run.
+    """Return the run in a file, partial or complete; a changed file is never accepted as a run.
 
     Raises
     ------
@@ -187,25 +178,21 @@ def read_run(path: Path | str) -> Run:
 
 def read_stored(path: Path | str) -> tuple[Run, RunEntry]:
     """Return the run in a file and the entry of the file; it raises the errors of `read_run`."""
-    with opened(path) as file:
-        return _judged(file, path, read_values)
-
-
-def _judged(file: Any, path: Path | str, read: Reader) -> tuple[Run, RunEntry]:
-    run, entry = _run_in(file, path, read), _entry(file, path)
-    if content_hash(run) != entry.content_hash:
-        raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
-    return run, entry
+    with opened_run(path, read_values) as found:
+        return found
 
 
 @contextmanager
-def opened_run(path: Path | str) -> Iterator[tuple[Run, RunEntry]]:
+def opened_run(path: Path | str, read: Reader = dataset_of) -> Iterator[tuple[Run, RunEntry]]:
     """Yield a run whose arrays stay in its file, to be read in `blocks`, and the entry of the file.
 
-    The file is checked like in `read_stored`, but in constant memory.
+    The file is checked completely, in constant memory.
     """
     with opened(path) as file:
-        yield _judged(file, path, dataset_of)
+        run, entry = _run_in(file, path, read), _entry(file, path)
+        if content_hash(run) != entry.content_hash:
+            raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
+        yield run, entry
 
 
 def read_provenance(path: Path | str) -> dict[str, str]:
@@ -217,21 +204,12 @@ def read_provenance(path: Path | str) -> dict[str, str]:
         The file is damaged, or an entry is not a text.
     """
     with opened(path, expected_format=None) as file:
-        group = _group(file, "provenance", path)
+        group = group_of(file, "provenance", path)
         found = {name: read_values(group, name, str(path)) for name in group}
     for name, text in found.items():
         if not isinstance(text, str):
             raise RunFileError(f"{path}: provenance/{name} is no text")
     return found
-
-
-def _group(file: Any, name: str, path: Path | str) -> Any:
-    """Return a group; raise RunFileError for a dataset in its place, because iterating over it might never end."""
-    import h5py
-
-    if not isinstance(file.get(name), h5py.Group):
-        raise RunFileError(f"{path}: the group {name} is missing")
-    return file[name]
 
 
 def read_entry(path: Path | str) -> RunEntry:
@@ -247,7 +225,7 @@ def read_entry(path: Path | str) -> RunEntry:
 
 
 def _entry(file: Any, path: Path | str) -> RunEntry:
-    names = [field.name for field in fields(RunEntry) if field.name != "file"]
+    names = RunEntry._fields[1:]
     absent = [name for name in names if name not in file.attrs]
     if absent:
         raise RunFileError(f"{path}: {', '.join(absent)} missing among its attributes")
@@ -260,9 +238,8 @@ def _run_in(file: Any, path: Path | str, read: Reader) -> Run:
     texts = {attribute: read_values(file[group], name, place) for group, name, attribute in TEXTS}
     tables = {group: {quantity.name: _numbers(read, file[group], quantity, place) for quantity in listed}
               for group, (listed, _) in GROUPS.items()}  # fmt: skip
-    energy, effects, names = _group(file, "energy", path), file["effects"], file["mechanism"]
-    lists = [read_values(effects, name, place) for name in ("effect", "active", "reason")]
-    lists.append(read_values(effects, "ignores", place) if "ignores" in effects else ("",) * len(lists[0]))  # old files
+    energy, effects, names = group_of(file, "energy", path), file["effects"], file["mechanism"]
+    lists = [read_values(effects, name, place) for name in ("effect", "active", "reason", "ignores")]
     parts: dict[str, Any] = texts | {attribute: json.loads(texts[attribute]) for attribute in JSON_TEXTS}
     parts |= {name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES}
     for name in ("tool_dofs", "tool_coordinates"):
@@ -284,26 +261,8 @@ def _run_in(file: Any, path: Path | str, read: Reader) -> Run:
     )  # fmt: skip
 
 
-class _Truths:
-    """An array of booleans that are stored as numbers 0 and 1, in a file or in memory."""
-
-    dtype = np.dtype(np.bool_)
-
-    def __init__(self, numbers: Any) -> None:
-        self._numbers, self.shape = numbers, numbers.shape
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __getitem__(self, rows: Any) -> np.ndarray:
-        return np.asarray(self._numbers[rows]).astype(np.bool_)
-
-
 def _numbers(read: Reader, group: Any, quantity: Quantity, path: str) -> Any:
     values = read(group, quantity.name, path)
     if not (hasattr(values, "dtype") and values.dtype.kind in "biuf" and values.ndim):
         raise RunFileError(f"{path}: {group.name}/{quantity.name} is no list of numbers")
-    if quantity.dtype is np.bool_:
-        values = _Truths(values)
-        return values[:] if read is read_values else values
-    return values
+    return values.astype(np.bool_) if quantity.dtype is np.bool_ else values

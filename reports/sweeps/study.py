@@ -45,15 +45,14 @@ class Range(Part):
     def values(self) -> tuple[float, ...]:
         """Return the values; the first and the last are exact."""
         shares = [i / (self.count - 1) for i in range(self.count)]
-        if self.scale == "log":
-            ratio = self.stop / self.start
-            if 0.0 < ratio < math.inf:
-                inner = [self.start * math.exp(share * math.log(ratio)) for share in shares]
-            else:  # the ratio of the ends overflows
-                low, high = math.log(self.start), math.log(self.stop)
-                inner = [math.exp((1.0 - share) * low + share * high) for share in shares]
-        else:
+        ratio = self.stop / self.start if self.scale == "log" else 1.0
+        if self.scale == "linear":
             inner = [self.start + share * (self.stop - self.start) for share in shares]
+        elif 0.0 < ratio < math.inf:
+            inner = [self.start * math.exp(share * math.log(ratio)) for share in shares]
+        else:  # the ratio of the ends overflows
+            low, high = math.log(self.start), math.log(self.stop)
+            inner = [math.exp((1.0 - share) * low + share * high) for share in shares]
         return (self.start, *inner[1:-1], self.stop)
 
 
@@ -110,10 +109,8 @@ def load_study(path: str | Path) -> Study:
 
     Raises
     ------
-    ArgumentError
-        The file cannot be read.
-    SceneError
-        The file is not a study, or has more than MAX_POINTS points; the error lists all mistakes.
+    ArgumentError, SceneError
+        The file cannot be read; it is not a study of at most MAX_POINTS points, with all mistakes.
     """
     try:
         with open(path, "rb") as file:
@@ -144,13 +141,7 @@ def study_names() -> tuple[str, ...]:
 
 
 def find_study(name: str) -> Path:
-    """Return the study file that `name` means: a path, or the name of a study that comes with the project.
-
-    Raises
-    ------
-    ArgumentError
-        There is no such file or study; the message lists the available studies.
-    """
+    """Return the study file that `name` means: a path, or the name of a study that comes with the project."""
     path, ours = Path(name), scene_folder() / "sweeps" / f"{name}.yaml"
     if path.is_file():
         return path
@@ -160,12 +151,7 @@ def find_study(name: str) -> Path:
 
 
 def scene_of(study: Study, path: Path) -> Path:
-    """Return the scene file of a study: in the study's folder or below, or a scene that comes with the project.
-
-    Parameters
-    ----------
-    study : the study read from the file
-    path : path of the study's file
+    """Return the scene file of the study in a file: in its folder or below, or a scene that comes with the project.
 
     Raises
     ------
@@ -207,23 +193,17 @@ class Point:
 
 def points_of(study: Study, scene: str) -> Iterator[Point]:
     """Yield the points; the outer loop is over the worlds, then over the grid axes in order, then over the draws."""
-    axes = study.axes()
-    combinations = itertools.product(study.worlds, itertools.product(*axes.values()))
-    index = 0
-    for world, chosen in combinations:
-        for drawn in draws(study):
-            given = {**study.values, **dict(zip(axes, chosen, strict=True)), **drawn}
-            law = {path.removeprefix(LAW): value for path, value in given.items() if path.startswith(LAW)}
-            values = {path: value for path, value in given.items() if not path.startswith(LAW)}
-            yield Point(index, scene, world, study.rendering, values, law)
-            index += 1
+    axes, drawn = study.axes(), list(_draws(study.random)) if study.random else [{}]
+    combinations = itertools.product(study.worlds, itertools.product(*axes.values()), drawn)
+    for index, (world, chosen, draw) in enumerate(combinations):
+        given = {**study.values, **dict(zip(axes, chosen, strict=True)), **draw}
+        law = {path.removeprefix(LAW): value for path, value in given.items() if path.startswith(LAW)}
+        values = {path: value for path, value in given.items() if not path.startswith(LAW)}
+        yield Point(index, scene, world, study.rendering, values, law)
 
 
-def draws(study: Study) -> Iterator[dict[str, float]]:
+def _draws(random: Draws) -> Iterator[dict[str, float]]:
     """Yield the random values; each draw has its own generator, so additional draws do not change earlier ones."""
-    if study.random is None:
-        yield {}
-        return
-    for i in range(study.random.count):
-        rng = np.random.default_rng([study.random.seed, i])
-        yield {path: float(rng.uniform(span.start, span.stop)) for path, span in study.random.values.items()}
+    for i in range(random.count):
+        rng = np.random.default_rng([random.seed, i])
+        yield {path: float(rng.uniform(span.start, span.stop)) for path, span in random.values.items()}

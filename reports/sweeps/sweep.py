@@ -7,7 +7,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -21,17 +22,19 @@ from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
 from reference.one_thread import one_thread
 from reference.worlds import find_world, require_complete
-from reports.batches import Scheduler, do_missing, here
+from reports.batches import Scheduler, here
 from reports.runner import run_inputs
 from reports.store.folder import RunStore
 from reports.store.io import mark_store
 from reports.store.keys import code_version
-from reports.store.tables import Column, Table, write_table
+from reports.store.tables import write_table
 from reports.sweeps.study import Point, Study, points_of
+from verification.table import table_from
 
 DONE, FAILED = "done", "failed"
 RUNS, SUMMARY = "runs", "summary.h5"
-_MEASURES = {"impacts": "1", "energy_lost": "J", "penetration": "m", "kinetic_energy": "J"}
+_MEASURES = ("impacts", "energy_lost [J]", "penetration [m]", "kinetic_energy [J]", "status", "note", "file",
+             "content_hash")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -90,9 +93,12 @@ def run_sweep(
     mark_store(folder)
     RunStore(folder / RUNS)  # makes the folder
     points, results = list(points_of(study, str(Path(scene).resolve()))), dict[int, Result]()
-    do_missing(points, partial(compute_point, folder=str(folder / RUNS), code=code_version()),
-               lambda point, result: results.update({point.index: result}), done=lambda point: False,
-               scheduler=scheduler, progress=progress or (lambda done, total: None))  # fmt: skip
+    compute = partial(compute_point, folder=str(folder / RUNS), code=code_version())
+    with closing(scheduler(compute, points)) as finished:
+        for point, result in finished:
+            results[point.index] = result
+            if progress is not None:
+                progress(len(results), len(points))
     ordered = tuple(results[point.index] for point in points)
     _write_summary(folder / SUMMARY, study, points, ordered)
     hashed = "".join(f"{result.index} {result.status} {result.content_hash}\n" for result in ordered)
@@ -101,37 +107,21 @@ def run_sweep(
 
 def _write_summary(path: Path, study: Study, points: list[Point], results: tuple[Result, ...]) -> None:
     """Write a table with a row per point: the changed values, the results, and the run file."""
-    columns = [Column("point", np.arange(len(points)), "1", "index of the point")]
-    columns += [Column("world", tuple(point.world for point in points), "1", "world")]
-    columns += list(_changed(points))
-    columns += [Column(name, np.array([getattr(result, name) for result in results], float), unit,
-                       name.replace("_", " ")) for name, unit in _MEASURES.items()]  # fmt: skip
-    columns += [Column(name, tuple(getattr(result, name) for result in results), "1", name.replace("_", " "))
-                for name in ("status", "note", "file", "content_hash")]
-    write_table(path, Table(study.name, tuple(columns), study.title or study.name, command="iapb sweep"))
-
-
-def _changed(points: list[Point]) -> Iterator[Column]:
-    given = [{**point.values, **{f"law.{name}": value for name, value in point.law.items()}} for point in points]
-    for path in dict.fromkeys(path for values in given for path in values):
-        values = [point.get(path) for point in given]
-        numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-        shown = np.array(values, float) if numeric else tuple(str(value) for value in values)
-        yield Column(path, shown, "SI" if numeric else "1", f"value of {path}")
+    rows = []
+    for point, result in zip(points, results, strict=True):
+        law = {f"law.{name}": value for name, value in point.law.items()}
+        measured = {title: getattr(result, title.partition(" [")[0]) for title in _MEASURES}
+        rows.append({"point": point.index, "world": point.world} | point.values | law | measured)
+    write_table(path, study.name, table_from(rows), title=study.title or study.name, command="iapb sweep")
 
 
 def compute_point(point: Point, folder: str, code: str) -> Result:
     """Compute a point, or read its run if it exists.
 
-    Parameters
-    ----------
-    folder : folder of the run files; this machine must have access to it
-    code : code version of the sweep; a worker with another version is refused
-
     Raises
     ------
     IapbError
-        This process runs another version of the code, or cannot access the folder.
+        This process runs another version than `code`, or cannot access the folder of the run files.
     """
     if code_version() != code:
         raise IapbError("a worker runs another version of iapb: install the same one on every machine")

@@ -11,74 +11,49 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("iapb", "reference", "verification", "reports")
+_FENCED = re.compile(r"^```(\w+)\n(.*?)^```$", flags=re.M | re.S)
+_FILE_LINE = re.compile(r"# ([\w./-]+\.(?:py|yaml|toml))\n")
+_COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", flags=re.M)
 
-_FILE_LINE = re.compile(r"^# ([\w./-]+\.(?:py|yaml))$")
-_FENCE = "```"
 
-
-@dataclass(frozen=True)
+@dataclass
 class Block:
-    """One thing to do: `kind` is python, command, file, diff or sh; `expected` is the output printed below it."""
+    """One thing to do: `kind` is python, command, file, diff or sh.
 
-    document: str
-    line: int  # of the opening fence, or of the command
+    id : document and line; path : of a file to write or change
+    expected, span : the output printed below it, and where the document has it; None without output
+    """
+
+    id: str
     kind: str
     source: str
     path: str = ""
     expected: str | None = None
-    expected_lines: tuple[int, int] = (0, 0)  # of the output in the document, first and one past the last (from 0)
-
-    @property
-    def id(self) -> str:
-        """Place in words."""
-        return f"{self.document}:{self.line}"
+    span: tuple[int, int] = (0, 0)
 
 
-def read_blocks(path: Path, name: str) -> list[Block]:
+def read_blocks(name: str) -> list[Block]:
     """Return the blocks of a document in order."""
+    text = (ROOT / name).read_text(encoding="utf-8")
     found: list[Block] = []
-    lines = path.read_text(encoding="utf-8").splitlines()
-    start = None
-    for number, line in enumerate(lines):
-        if not line.startswith(_FENCE):
-            continue
-        if start is None:
-            start = number
-            continue
-        _add(found, name, lines[start][len(_FENCE):].strip(), start, lines[start + 1 : number])
-        start = None
+    for fenced in _FENCED.finditer(text):
+        language, body = fenced.groups()
+        place, named = f"{name}:{text.count(chr(10), 0, fenced.start()) + 1}", _FILE_LINE.match(body)
+        if language == "text" and found[-1].kind == "python" and found[-1].expected is None:
+            found[-1].expected, found[-1].span = body, fenced.span(2)
+        elif language == "console":
+            found += [Block(place, "command", command[1], "", command[2], tuple(fenced.start(2) + k for k in
+                                                                                  command.span(2)))
+                      for command in _COMMAND.finditer(body)]  # fmt: skip
+        elif language in ("diff", "python", "yaml") and named:
+            found.append(Block(place, "diff" if language == "diff" else "file",
+                               body[named.end():] if language == "diff" else body, named[1]))  # fmt: skip
+        elif language in ("python", "sh"):
+            found.append(Block(place, language, body))
+        else:
+            raise ValueError(f"{place}: a block of kind {language!r} is shown but never checked")
     return found
-
-
-def _add(found: list[Block], name: str, language: str, start: int, body: list[str]) -> None:
-    named = _FILE_LINE.match(body[0]) if body else None
-    text = "\n".join(body) + "\n"
-    if language == "text":
-        if not found or found[-1].kind != "python" or found[-1].expected is not None:
-            raise ValueError(f"{name}:{start + 1}: a text block must follow a python block")
-        found[-1] = replace(found[-1], expected=text, expected_lines=(start + 1, start + 1 + len(body)))
-    elif language == "console":
-        found.extend(_commands(name, start, body))
-    elif language == "diff" and named:
-        found.append(Block(name, start + 1, "diff", "\n".join(body[1:]), named.group(1)))
-    elif language in ("python", "yaml") and named:
-        found.append(Block(name, start + 1, "file", text, named.group(1)))
-    elif language in ("python", "sh"):
-        found.append(Block(name, start + 1, language, text))
-    else:
-        raise ValueError(f"{name}:{start + 1}: a block of kind {language!r} is shown but never checked")
-
-
-def _commands(name: str, start: int, body: list[str]) -> list[Block]:
-    places = [k for k, line in enumerate(body) if line.startswith("$ ")]
-    blocks = []
-    for place, after in zip(places, [*places[1:], len(body)], strict=True):
-        output = "\n".join(body[place + 1 : after]) + "\n"
-        span = (start + place + 2, start + after + 1)
-        blocks.append(Block(name, start + place + 2, "command", body[place][2:], "", output, span))
-    return blocks

@@ -1,6 +1,6 @@
-"""Performs the blocks of one document in a process of its own: `python performing.py BLOCKS.json ANSWERS.json`.
+"""Performs the blocks of one document in a process of its own: `python performing.py DOCUMENT ANSWERS.json`.
 
-The working directory is where files are written; in documents that add to the project it holds a copy of it.
+The working directory is where files are written; for documents that add to the project it holds a copy of it.
 """
 
 from __future__ import annotations
@@ -16,17 +16,18 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-WRITTEN = ("file", "diff")
+from blocks import Block, read_blocks
 
 
-def perform(blocks: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Do every block; a failure is recorded, and the blocks after it are still tried.
+def perform(name: str) -> list[dict[str, str]]:
+    """Do every block of a document; a failure is recorded, and the blocks after it are still tried.
 
     Files and lines are written first: what is imported once would not see a line that comes later.
     """
     namespace: dict[str, Any] = {"__name__": "document"}
-    answers: list[dict[str, Any]] = [{}] * len(blocks)
-    for number, block in sorted(enumerate(blocks), key=lambda pair: pair[1]["kind"] not in WRITTEN):
+    blocks = read_blocks(name)
+    answers: list[dict[str, str]] = [{}] * len(blocks)
+    for number, block in sorted(enumerate(blocks), key=lambda pair: pair[1].kind not in ("file", "diff")):
         out, failure = io.StringIO(), ""
         try:
             with redirect_stdout(out), redirect_stderr(out):
@@ -37,17 +38,17 @@ def perform(blocks: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return answers
 
 
-def _perform(block: dict[str, Any], namespace: dict[str, Any]) -> None:
-    if block["kind"] == "file":
-        path = Path(block["path"])
+def _perform(block: Block, namespace: dict[str, Any]) -> None:
+    path = Path(block.path)
+    if block.kind == "file":
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(block["source"], encoding="utf-8")
-    elif block["kind"] == "diff":
-        apply_diff(Path(block["path"]), block["source"])
-    elif block["kind"] == "python":
-        exec(compile(block["source"], f"{block['document']}:{block['line']}", "exec"), namespace)
-    elif block["kind"] == "command":
-        _command(shlex.split(block["source"]))
+        path.write_text(block.source, encoding="utf-8")
+    elif block.kind == "diff":
+        apply_diff(path, block.source)
+    elif block.kind == "python":
+        exec(compile(block.source, block.id, "exec"), namespace)
+    elif block.kind == "command":
+        _command(shlex.split(block.source))
 
 
 def _command(words: list[str]) -> None:
@@ -59,8 +60,9 @@ def _command(words: list[str]) -> None:
         told = io.StringIO()
         with redirect_stderr(told):
             failed = main(words[1:])
-        if failed:
-            print(_without_progress(told.getvalue()), end="")
+        if failed:  # what it complains about, without its progress
+            lines = told.getvalue().splitlines(keepends=True)
+            print("".join(line for line in lines if not line.endswith(" ...\n")), end="")
     elif words[0] == "cat":
         print(Path(words[1]).read_text(encoding="utf-8"), end="")
     elif words[0] == "pytest":
@@ -73,13 +75,8 @@ def _command(words: list[str]) -> None:
         raise ValueError(f"documents may not use the command {words[0]!r}: nothing would check it")
 
 
-def _without_progress(told: str) -> str:
-    """What a command complains about; how far it is is no part of a document."""
-    return "".join(line for line in told.splitlines(keepends=True) if not line.endswith(" ...\n"))
-
-
 def apply_diff(path: Path, text: str) -> None:
-    """Insert the lines with "+" beside the lines with " ", each of which must be in the file exactly once."""
+    """Insert the lines with "+" beside those with " ", each of which must be in the file exactly once."""
     lines = path.read_text(encoding="utf-8").splitlines()
     waiting: list[str] = []
     place: int | None = None
@@ -106,5 +103,4 @@ def apply_diff(path: Path, text: str) -> None:
 
 if __name__ == "__main__":
     sys.path.insert(0, ".")
-    asked = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
-    Path(sys.argv[2]).write_text(json.dumps(perform(asked)), encoding="utf-8")
+    Path(sys.argv[2]).write_text(json.dumps(perform(sys.argv[1])), encoding="utf-8")

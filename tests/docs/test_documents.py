@@ -1,51 +1,84 @@
-"""Every block of the documents is performed; what they show is what comes out.
+"""Every block of the documents is performed, and every example; what they show is what comes out.
 
-`IAPB_UPDATE_DOCS=1 pytest tests/docs` writes the outputs of today into the documents instead.
+`IAPB_UPDATE_DOCS=1 pytest tests/docs` writes the outputs of today into the documents instead; shortened ones stay.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
-from collections.abc import Callable
-from typing import Any
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
-from blocks import ROOT, Block, read_blocks
+
+sys.path.insert(0, str(Path(__file__).parent))  # importmode=importlib does not
+
+from blocks import ROOT, read_blocks
 from comparing import differs
 
-UPDATE = bool(os.environ.get("IAPB_UPDATE_DOCS"))
-DOCUMENTS = ("README.md", "docs/scenes.md", "docs/resolvers.md", "docs/tutorial.md", "docs/extending.md")
-BLOCKS = [(k, block) for name in DOCUMENTS for k, block in enumerate(read_blocks(ROOT / name, name))]
+from reports.cli import main
+
+PACKAGES = ("iapb", "reference", "verification", "reports")
+ADDS_TO_THE_PROJECT = ("docs/extending.md",)
+DOCUMENTS = ("docs/tutorial.md", "docs/extending.md", "README.md", "docs/scenes.md", "docs/resolvers.md")
+WIDTH = "100"  # of the terminal that the documents show
 
 
-@pytest.mark.parametrize(("number", "block"), BLOCKS, ids=[block.id for _, block in BLOCKS])
-def test_block(number: int, block: Block, answers_of: Callable[[str], list[dict[str, Any]]]) -> None:
-    answer = answers_of(block.document)[number]
-    assert not answer["failure"], f"{block.id}\n{answer['failure']}"
-    if block.expected is not None and not UPDATE:
-        difference = differs(answer["output"], block.expected)
-        assert not difference, f"{block.id}: {difference}\n\n{answer['output']}"
+def copy_project(folder: Path) -> None:
+    """Copy the packages and scenes; compiled kernels are shared with the original, or every run would recompile."""
+    for name in PACKAGES:
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        for cache_folder in (ROOT / name).rglob("__pycache__"):
+            (folder / cache_folder.relative_to(ROOT)).symlink_to(cache_folder, target_is_directory=True)
+    shutil.copytree(ROOT / "scenes", folder / "scenes")
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
-def test_make_targets_exist(name: str) -> None:
+def test_document(name: str, tmp_path: Path) -> None:
+    work, told = tmp_path / "work", tmp_path / "answers.json"
+    work.mkdir()
+    if name in ADDS_TO_THE_PROJECT:
+        copy_project(work)
+    environment = {**os.environ, "PYTHONPATH": f"{work}{os.pathsep}{ROOT}", "PYTHONDONTWRITEBYTECODE": "1",
+                   "COLUMNS": WIDTH, "TERM": "dumb", "NO_COLOR": "1"}  # fmt: skip
+    for variable in ("CI", "BUILD_NUMBER", "PYTEST_ADDOPTS"):  # where these are set, pytest prints more
+        environment.pop(variable, None)
+    done = subprocess.run([sys.executable, str(Path(__file__).parent / "performing.py"), name, str(told)],
+                          cwd=work, env=environment, capture_output=True, text=True)  # fmt: skip
+    assert done.returncode == 0, done.stderr
     makefile = (ROOT / "Makefile").read_text()
-    for block in read_blocks(ROOT / name, name):
-        for target in re.findall(r"^make (\w+)", block.source, flags=re.M) if block.kind == "sh" else ():
-            assert re.search(rf"^{target}:", makefile, flags=re.M), f"{block.id}: no make target {target!r}"
-
-
-if UPDATE:
-
-    @pytest.mark.parametrize("name", DOCUMENTS)
-    def test_update(name: str, answers_of: Callable[[str], list[dict[str, Any]]]) -> None:
-        """Write today's outputs into the document, from the last block to the first; shortened ones ("…") stay."""
-        path = ROOT / name
-        lines = path.read_text(encoding="utf-8").splitlines()
-        pairs = list(zip(read_blocks(path, name), answers_of(name), strict=True))
+    pairs, wrong = list(zip(read_blocks(name), json.loads(told.read_text()), strict=True)), []
+    for block, answer in pairs:
+        difference = "" if block.expected is None else differs(answer["output"], block.expected)
+        if answer["failure"] or difference and not os.environ.get("IAPB_UPDATE_DOCS"):
+            wrong.append(f"{block.id}: {answer['failure'] or difference}\n\n{answer['output']}")
+        targets = re.findall(r"^make (\w+)", block.source, flags=re.M) if block.kind == "sh" else []
+        wrong += [f"{block.id}: no make target {target!r}" for target in targets if f"\n{target}:" not in makefile]
+    if os.environ.get("IAPB_UPDATE_DOCS"):
+        text = (ROOT / name).read_text(encoding="utf-8")
         for block, answer in reversed(pairs):
             if block.expected is not None and "…" not in block.expected:
-                first, last = block.expected_lines
-                lines[first:last] = [line.rstrip() for line in answer["output"].strip("\n").splitlines()]
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+                lines = [line.rstrip() for line in answer["output"].strip("\n").splitlines()]
+                text = text[: block.span[0]] + "".join(f"{line}\n" for line in lines) + text[block.span[1] :]
+        (ROOT / name).write_text(text, encoding="utf-8")
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
+def test_example(path: Path, tmp_path: Path) -> None:
+    tool = ["-m", "pytest", "-q", "-p", "no:cacheprovider"] if path.stem.startswith("test_") else []
+    done = subprocess.run([sys.executable, *tool, str(path)], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)},
+                          capture_output=True, text=True)  # fmt: skip
+    assert done.returncode == 0 and done.stdout.strip(), done.stdout + done.stderr
+
+
+def test_the_picture_of_the_readme_shows_the_runs_of_today(tmp_path: Path) -> None:
+    """What it says of itself in words and numbers: how far each world ends from the ideal one."""
+    assert main(["reproduce", "--figure", "hero", "--out", str(tmp_path)]) == 0
+    drawn, kept = (re.findall(r"<desc>(.*?)</desc>", path.read_text(encoding="utf-8"), flags=re.S)[0] for path in
+                   (tmp_path / "hero.svg", ROOT / "docs/pictures/peg_in_the_corner.svg"))  # fmt: skip
+    assert not differs(drawn, kept), "draw it again: iapb reproduce --figure hero"

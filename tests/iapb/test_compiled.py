@@ -17,7 +17,7 @@ from numba import njit
 from numba.core.errors import NumbaError
 
 import iapb.run
-from iapb.compiled import Block, _stamped_files, block, copy_into, flag, kernel
+from iapb.compiled import Block, _stamped_files, block, flag, kernel
 
 ENGINE = Path(iapb.run.__file__).parent
 
@@ -128,13 +128,6 @@ def test_types_of_blocks_differ_where_their_fields_do_and_survive_a_file():
     read(other, out)
     assert out[8] == 7.0  # compiled anew, with another width
     assert pickle.loads(pickle.dumps(same.block_type)) == same.block_type
-
-
-@given(st.lists(st.floats(allow_nan=False), max_size=6))
-def test_copy_into_copies(values):
-    source, target = np.array(values, float), np.zeros(len(values))
-    copy_into(target, source)
-    assert np.array_equal(source, target)
 
 
 def test_the_stamp_of_kernels_covers_every_file_whose_constants_they_read():

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import llvmlite.binding as llvm
-import numba
 import numpy as np
 import pytest
 from numba.core import config
@@ -77,32 +76,3 @@ def test_what_is_not_inlined_has_no_name_that_another_library_could_be_given(mon
     parts = [part for part in version.library._final_module.functions if not part.is_declaration]
     kept = [part for part in parts if "_sum" not in part.name]
     assert kept and all(part.linkage == llvm.Linkage.private for part in kept)
-
-
-def test_what_is_used_of_numbas_internals_is_still_there() -> None:
-    """A canary: after an update of numba it names what is gone, before kernels fail in ways that are hard to read."""
-    from numba.core import cgutils, codegen, compiler, imputils, typed_passes
-
-    dispatcher = kernel(lambda x: x)
-    dispatcher.enable_caching()
-    library = dispatcher.targetctx.codegen().create_library("canary")
-    used = [
-        (codegen.JITCodeLibrary, "_optimize_functions _optimize_final_module finalize enable_object_caching"),
-        (typed_passes.NativeLowering, "run_pass"), (compiler.DefaultPassBuilder, "define_nopython_pipeline"),
-        (dispatcher, "get_call_template get_overload compile add_overload overloads"),
-        (dispatcher._cache._cache_file, "_source_stamp"),
-        (library, "_codegen _final_module _linking_libraries _finalized"),
-        (llvm.create_pipeline_tuning_options(speed_level=3), "loop_vectorization inlining_threshold"),
-        (llvm, "create_pass_builder Linkage"), (cgutils, "is_not_null"), (imputils, "impl_ret_borrowed"),
-    ]
-    gone = [f"{owner}.{name}" for owner, names in used for name in names.split() if not hasattr(owner, name)]
-    assert not gone, f"numba {numba.__version__} lacks {', '.join(gone)}: see iapb/compiled.py and iapb/inlining.py"
-
-
-def test_an_array_is_handed_over_as_numba_lays_it_out() -> None:
-    """A block writes arrays as words: meminfo, parent, item count, item size, address, shape, strides."""
-    from numba.core import types
-    from numba.core.datamodel import default_manager
-
-    model = default_manager.lookup(types.Array(types.float64, 2, "C"))
-    assert list(model._fields) == ["meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides"]

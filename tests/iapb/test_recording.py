@@ -79,21 +79,6 @@ def test_parts_of_a_run_continue_each_other():
     assert np.array_equal(np.concatenate([part.impacts.mass_digest for part in parts]), whole.impacts.mass_digest)
 
 
-def test_changing_the_run_of_a_checkpoint_changes_no_other_run():
-    class Careless:
-        due, runs = True, 0
-
-        def __call__(self, run):
-            self.runs += 1
-            for values in results_of(run).values():
-                values[...] = 1
-
-    scene, careless = load_scene(find_scene("peg_corner")), Careless()
-    changed = simulate(scene, steps=STEPS + 512, checkpoint=careless)
-    assert careless.runs
-    assert_same(changed, simulate(scene, steps=STEPS + 512))
-
-
 def test_time_names_and_the_rendered_force_fit_the_arrays():
     scene = load_scene(find_scene("arm_pushing"))
     run = simulate(scene, coupling=coupling_of(scene, "four-channel"), steps=STEPS)

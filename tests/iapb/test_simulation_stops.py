@@ -130,22 +130,3 @@ def test_a_law_that_returns_no_step_is_named_and_the_steps_before_are_kept(what)
     run = simulate(PEG, Wrapped(WRONG_RESULTS[what], after=50), steps=STEPS)
     assert_readable(run, 50)
     assert "wrapped" in run.stopped and "expected" in run.stopped
-
-
-def test_checkpoints_are_partial_runs_written_when_due(monkeypatch):
-    monkeypatch.setattr(recording, "_STEPS_PER_CHUNK", 100)
-    kept = []
-
-    class Checkpoint:
-        due = True
-
-        def __call__(self, run):
-            kept.append(run)
-
-    simulate(PEG, steps=STEPS, checkpoint=Checkpoint())
-    assert [run.steps for run in kept] == [100, 200, 300]
-    for run in kept:
-        assert_readable(run, run.steps)
-    Checkpoint.due = False
-    simulate(PEG, steps=STEPS, checkpoint=Checkpoint())
-    assert len(kept) == 3

@@ -7,6 +7,7 @@ that two independent computations converge to.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -91,10 +92,16 @@ def scene(duration: float, bodies: list[Values], walls: list[Values] | None = No
 # Bodies. Planar: x, y, angle and velocities of the centre. In space: velocities in world axes at the unturned start.
 
 
-def box(name: str, w: float, h: float, mass: float, at: Numbers, velocity: Numbers = (0, 0, 0)) -> Values:
-    """Return a homogeneous planar box."""
-    return {"name": name, "joint": "planar", "mass": mass, "inertia": mass * (w * w + h * h) / 12,
-            "shapes": [{"kind": "box", "size": [w, h]}], "position": list(at), "velocity": list(velocity)}
+def box(name: str, size: Numbers, mass: float, at: Numbers, velocity: Numbers | None = None) -> Values:
+    """Return a homogeneous box, planar or in space as its size says."""
+    squares = [mass * length**2 / 12 for length in size]
+    shape = {"name": name, "mass": mass, "shapes": [{"kind": "box", "size": list(size)}]}
+    if len(size) == 2:
+        return shape | {"joint": "planar", "inertia": mass * sum(length * length for length in size) / 12,
+                        "position": list(at), "velocity": list(velocity or (0, 0, 0))}  # fmt: skip
+    a, b, c = squares
+    return shape | {"joint": "free_flyer", "inertia": [b + c, a + c, a + b], "position": [*at, *NO_TURN],
+                    "velocity": list(velocity or (0,) * 6)}  # fmt: skip
 
 
 def disc(name: str, r: float, mass: float, at: Numbers, velocity: Numbers = (0, 0, 0)) -> Values:
@@ -110,13 +117,6 @@ def stone(name: str, corners: list[tuple[float, float]], mass: float) -> Values:
     area = 0.5 * sum(a[0] * b[1] - a[1] * b[0] for a, b in turned)
     return {"name": name, "joint": "planar", "density": mass / abs(area), "position": [x, y, 0.0],
             "shapes": [{"kind": "polygon", "vertices": [[a - x, b - y] for a, b in corners]}]}
-
-
-def block(name: str, size: Numbers, mass: float, at: Numbers, velocity: Numbers = (0,) * 6) -> Values:
-    """Return a homogeneous box in space."""
-    a, b, c = (mass * length**2 / 12 for length in size)
-    return {"name": name, "joint": "free_flyer", "mass": mass, "inertia": [b + c, a + c, a + b],
-            "shapes": [{"kind": "box", "size": list(size)}], "position": [*at, *NO_TURN], "velocity": list(velocity)}
 
 
 def ball(name: str, r: float, mass: float, at: Numbers, velocity: Numbers = (0,) * 6) -> Values:
@@ -249,7 +249,7 @@ def spinning(size: Numbers, speed: float, drift: float = 0.0, center: Numbers = 
     """Return a free box or a ball (one size) of 1 kg that spins about no principal axis, and moves along x."""
     velocity = (drift, 0.0, 0.0, *(speed * x for x in axis))
     made = (ball("body", size[0], 1.0, (0, 0, 0), velocity) if len(size) == 1 else
-            block("body", size, 1.0, (0, 0, 0), velocity))  # fmt: skip
+            box("body", size, 1.0, (0, 0, 0), velocity))  # fmt: skip
     return scene(duration, [made | ({"center_of_mass": list(center)} if any(center) else {})],
                  gravity=gravity)
 
@@ -302,7 +302,7 @@ ARM = [link("upper", 0.5, 1.0, angle=0.3), link("lower", 0.5, 1.0, "upper", (0.5
 SPINNING_ARM = [link("upper", 0.5, 1.0, speed=20.0), link("lower", 0.5, 1.0, "upper", (0.5, 0.0), angle=0.8)]
 CART = {"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "position": [0.0], "velocity": [0.5]}
 ROBOT = [
-    block("base", (0.3, 0.2, 0.1), 4.0, (0, 0, 0), (0.5, 0.2, 0, 1.0, 0.5, 2.0)) | {"shapes": []},
+    box("base", (0.3, 0.2, 0.1), 4.0, (0, 0, 0), (0.5, 0.2, 0, 1.0, 0.5, 2.0)) | {"shapes": []},
     link("thigh", 0.3, 1.0, "base", (0.15, 0.0, 0.0), 0.4, 3.0, axis=[0, 1, 0]),
     link("shin", 0.3, 0.5, "thigh", (0.3, 0.0, 0.0), -0.8, -4.0, axis=[0, 1, 0]),
 ]
@@ -325,7 +325,7 @@ def rolled(v: float, w: float, mu: float, time: float, share: float = 0.4) -> fl
 
 
 R = 0.03
-CRATE = box("crate", 0.4, 0.4, 40.0, (-1.0, 1.2, 0))
+CRATE = box("crate", (0.4, 0.4), 40.0, (-1.0, 1.2, 0))
 TILT = math.radians(20.0)
 ALONG, OUT = (math.cos(TILT), -math.sin(TILT)), (math.sin(TILT), math.cos(TILT))  # down the slope, out of it
 SLOPE = {"name": "slope", "kind": "half_plane", "point": [0, 0], "normal": list(OUT)}
@@ -389,7 +389,7 @@ def tipped(w: float, h: float, speed: float, time: float) -> float:
 
 def on_slope(mu: float) -> Values:
     """Return a box that starts at rest with its face on a slope of 20 degrees."""
-    return scene(1.0, [box("box", 0.1, 0.1, 1.0, (0.05 * OUT[0], 0.05 * OUT[1], -TILT))], [SLOPE], mu)
+    return scene(1.0, [box("box", (0.1, 0.1), 1.0, (0.05 * OUT[0], 0.05 * OUT[1], -TILT))], [SLOPE], mu)
 
 
 def lands(motion: Motion) -> list[float]:
@@ -398,23 +398,23 @@ def lands(motion: Motion) -> list[float]:
     return [motion.place[-1, 0, 2], float(np.ptp(last, axis=0).max())]
 
 
-add("box_slides_and_stops", scene(1.5, [box("box", 0.1, 0.1, 1.0, (0, 0.05, 0), (2, 0, 0))], [FLOOR], 0.3),
+add("box_slides_and_stops", scene(1.5, [box("box", (0.1, 0.1), 1.0, (0, 0.05, 0), (2, 0, 0))], [FLOOR], 0.3),
     moved(), 4 / (0.6 * G), 4 / (0.6 * G), "v²/2μg")
 add("box_slides_in_space",
-    scene(1.5, [block("box", (0.1, 0.1, 0.1), 1.0, (0, 0, 0.05), (1.2, 1.6, 0, 0, 0, 0))], [GROUND], 0.3),
+    scene(1.5, [box("box", (0.1, 0.1, 0.1), 1.0, (0, 0, 0.05), (1.2, 1.6, 0, 0, 0, 0))], [GROUND], 0.3),
     lambda motion: motion.place[-1, 0, :2], np.array([0.6, 0.8]) * 4 / (0.6 * G), 4 / (0.6 * G), "v²/2μg")  # fmt: skip
 add("box_stays_on_slope", on_slope(0.5), farthest(0.05), 0.0, 0.1, "stays: tan 20° < 0.5")
 SLID = G / 2 * (math.sin(TILT) - 0.2 * math.cos(TILT))
 add("box_slides_down_slope", on_slope(0.2), lambda motion: (motion.place[-1, 0] - motion.place[0, 0]) @ [*ALONG, 0],
     SLID, SLID, "g (sin − μ cos)")
 add("thrown_box_lands",
-    scene(3.0, [block("box", (0.1, 0.1, 0.1), 1.0, (0, 0, 0.5), (1, 0.5, 1, 5, -7, 3))], [GROUND], 0.6),
+    scene(3.0, [box("box", (0.1, 0.1, 0.1), 1.0, (0, 0, 0.5), (1, 0.5, 1, 5, -7, 3))], [GROUND], 0.6),
     lands, [0.05, 0.0], 0.1, "rests on a face")
-add("box_tips_over_edge", scene(0.25, [box("box", 0.04, 0.1, 1.0, (0, 0.05, 0), (0.25, 0.1, -5.0))], [FLOOR], 1.0),
+add("box_tips_over_edge", scene(0.25, [box("box", (0.04, 0.1), 1.0, (0, 0.05, 0), (0.25, 0.1, -5.0))], [FLOOR], 1.0),
     lambda motion: -motion.angle()[-1], lambda: tipped(0.04, 0.1, 5.0, 0.25), 1.0, "turns about its edge, DOP853; "
     "an error grows ninefold while it passes the upright pose", 0.02)
 
-PAIR = [box("lower", 0.4, 0.1, 1.0, (0, 0.05, 0)), box("upper", 0.1, 0.1, 1.0, (0, 0.15, 0))]
+PAIR = [box("lower", (0.4, 0.1), 1.0, (0, 0.05, 0)), box("upper", (0.1, 0.1), 1.0, (0, 0.15, 0))]
 add("pushed_box_stays", scene(1.0, PAIR[:1], [FLOOR], 0.4, hand={"body": "lower", "force": [3.5, 0, 0]}),
     farthest(0.2), 0.0, 0.1, "stays: 3.5 N < μ m g")
 add("pushed_box_carries", scene(0.5, PAIR, [FLOOR], 0.4, hand={"body": "lower", "force": [12.0, 0, 0]}),
@@ -426,13 +426,12 @@ add("pushed_box_slips_away", scene(0.2, PAIR, [FLOOR], 0.2, hand={"body": "lower
 # Towers and loads. What stands moves by less than 1 mm, or a tenth of its thinnest body.
 
 
-def tower(count: int, shift: float, mass: float = 1.0, duration: float = 2.0, space: bool = False) -> Values:
+def stack(masses: list[float], shift: float = 0.0, duration: float = 2.0, space: bool = False) -> Values:
     """Return boxes of 0.1 m on each other, every second one shifted."""
-    at = [((i % 2) * shift, 0.05 + 0.1 * i) for i in range(count)]
-    if space:
-        cubes = [block(f"box_{i}", (0.1, 0.1, 0.1), mass, (x, x, y)) for i, (x, y) in enumerate(at)]
-        return scene(duration, cubes, [GROUND], 0.5)
-    return scene(duration, [box(f"box_{i}", 0.1, 0.1, mass, (x, y, 0)) for i, (x, y) in enumerate(at)], [FLOOR], 0.5)
+    at = [((i % 2) * shift, 0.05 + 0.1 * i) for i in range(len(masses))]
+    boxes = [box(f"box_{i}", (0.1,) * (2 + space), mass, (x, x, y) if space else (x, y, 0))
+             for i, ((x, y), mass) in enumerate(zip(at, masses, strict=True))]  # fmt: skip
+    return scene(duration, boxes, [GROUND if space else FLOOR], 0.5)
 
 
 def add_standing(name: str, values: Values, size: float = 0.05, most: float = 1e-3) -> None:
@@ -440,33 +439,21 @@ def add_standing(name: str, values: Values, size: float = 0.05, most: float = 1e
     add(name, values, farthest(size), 0.0, 0.1, f"stands: moves less than {1e3 * most:g} mm; scale 0.1 m", most / 0.1)
 
 
-def ratio(factor: float, space: bool = False) -> Values:
-    """Return a box on one of 1 g that is lighter by a factor."""
-    masses = enumerate((1e-3, 1e-3 * factor))
-    if space:
-        cubes = [block(f"box_{i}", (0.1, 0.1, 0.1), mass, (0, 0, 0.05 + 0.1 * i)) for i, mass in masses]
-        return scene(1.0, cubes, [GROUND], 0.5)
-    return scene(1.0, [box(f"box_{i}", 0.1, 0.1, m, (0, 0.05 + 0.1 * i, 0)) for i, m in masses], [FLOOR], 0.5)
-
-
-add_standing("tower_5", tower(5, 1e-6))
-add_standing("tower_5_shifted", tower(5, 1e-3))
-add_standing("tower_10", tower(10, 1e-6))
-add_standing("tower_10_shifted", tower(10, 1e-3))
-add_standing("tower_20", tower(20, 1e-6))
-add_standing("tower_20_shifted", tower(20, 1e-3))
-add_standing("tower_8_long", tower(8, 1e-6, duration=5.0))
-add_standing("tower_of_10_g", tower(5, 0.0, 0.01))
-add_standing("tower_of_100_g", tower(5, 0.0, 0.1))
-add_standing("tower_5_in_space", tower(5, 1e-6, space=True))
-add_standing("tower_10_in_space_shifted", tower(10, 1e-3, duration=1.0, space=True))
-add_standing("ratio_1e3", ratio(1e3))
-add_standing("ratio_1e6", ratio(1e6))
-add_standing("ratio_1e6_in_space", ratio(1e6, space=True))
-add_standing("coin_under_book", scene(1.0, [box("coin", 0.025, 0.002, 0.005, (0, 0.001, 0)),
-                                            box("book", 0.2, 0.03, 1.0, (0, 0.017, 0))], [FLOOR], 0.5), 0.0125, 2e-4)
+for count, shift in itertools.product((5, 10, 20), (1e-6, 1e-3)):
+    add_standing(f"tower_{count}" + "_shifted" * (shift > 1e-6), stack([1.0] * count, shift))
+add_standing("tower_8_long", stack([1.0] * 8, 1e-6, duration=5.0))
+add_standing("tower_of_10_g", stack([0.01] * 5))
+add_standing("tower_of_100_g", stack([0.1] * 5))
+add_standing("tower_5_in_space", stack([1.0] * 5, 1e-6, space=True))
+add_standing("tower_10_in_space_shifted", stack([1.0] * 10, 1e-3, duration=1.0, space=True))
+# A box on one of 1 g that is lighter by a factor.
+add_standing("ratio_1e3", stack([1e-3, 1e-3 * 1e3], duration=1.0))
+add_standing("ratio_1e6", stack([1e-3, 1e-3 * 1e6], duration=1.0))
+add_standing("ratio_1e6_in_space", stack([1e-3, 1e-3 * 1e6], duration=1.0, space=True))
+add_standing("coin_under_book", scene(1.0, [box("coin", (0.025, 0.002), 0.005, (0, 0.001, 0)),
+                                            box("book", (0.2, 0.03), 1.0, (0, 0.017, 0))], [FLOOR], 0.5), 0.0125, 2e-4)
 add_standing("balls_under_slab", scene(1.0, [disc(f"ball_{i}", 0.01, 0.002, (0.1 * i - 0.1, 0.01, 0)) for i in range(3)]
-                                       + [box("slab", 0.3, 0.02, 5.0, (0, 0.03, 0))], [FLOOR], 0.5), 0.01)
+                                       + [box("slab", (0.3, 0.02), 5.0, (0, 0.03, 0))], [FLOOR], 0.5), 0.01)
 SIN, COS = math.sin(math.radians(5)), math.cos(math.radians(5))
 NARROW = [{"name": f"side_{i}", "kind": "half_plane", "point": [0, 0], "normal": [side * COS, SIN]}
           for i, side in enumerate((1, -1))]  # fmt: skip
@@ -529,7 +516,7 @@ def peg(mu: float) -> Values:
     sides = [{"name": name, "kind": "box", "size": [0.04, 0.04], "center": [side * (hole / 2 + 0.02), -0.02]}
              for name, side in (("left", -1), ("right", 1))]
     end = {"name": "end", "kind": "box", "size": [0.2, 0.02], "center": [0, -0.05]}
-    return scene(0.5, [box("peg", w, 0.06, 0.1, (x - hole / 2, y - deep, -t))], [*sides, end], mu, gravity=0.0,
+    return scene(0.5, [box("peg", (w, 0.06), 0.1, (x - hole / 2, y - deep, -t))], [*sides, end], mu, gravity=0.0,
                  hand={"body": "peg", "point": [0.009, 0.03], "force": [0, -5, 0]})
 
 
@@ -568,7 +555,7 @@ add("ladder_slips", ladder(0.3, math.radians(50), 0.5), lambda motion: motion.an
     FELL, FELL, "slips at both ends, DOP853")
 for mass in (0.005, 0.3, 10.0):
     add(f"ball_on_book_of_{1000 * mass:g}_g",
-        scene(0.5, [box("book", 0.2, 0.02, mass, (0, 0.01, 0)), disc("ball", 0.03, 0.3, (0, 0.35, 0))], [FLOOR],
+        scene(0.5, [box("book", (0.2, 0.02), mass, (0, 0.01, 0)), disc("ball", 0.03, 0.3, (0, 0.35, 0))], [FLOOR],
               restitution=0.8),
         lambda motion: float(motion.place[300:, 1, 1].max()) - 0.05, 0.64 * 0.3, 0.3, "rises to e² of its height", 0.02)
 add("row_that_touches",
@@ -578,10 +565,10 @@ add("row_that_touches",
     "the last one leaves")
 add("plastic_drop", scene(0.8, [disc("disc", 0.03, 0.1, (0, 1.03, 0))], [FLOOR]),
     lambda motion: float(motion.place[500:, 0, 1].max()) - 0.03, 0.0, 1.0, "stays down", 1e-3)
-add("pushed_by_a_function", scene(0.5, [box("box", 0.1, 0.1, 0.1, (0, 0.05, 0))], [FLOOR],
+add("pushed_by_a_function", scene(0.5, [box("box", (0.1, 0.1), 0.1, (0, 0.05, 0))], [FLOOR],
                                   hand={"body": "box", "force_function": ["0", "-1000*sin(t)", "0"]}),
     lambda motion: float(motion.place[:, 0, 1].min()) - 0.05, 0.0, 0.1, "sags below a thousandth of its height", 1e-3)
-DOMINOES = [box(f"domino_{i}", 0.02, 0.1, 0.05, (0.05 * i, 0.05, 0), (0.2, 0.04, -4) if i == 0 else (0, 0, 0))
+DOMINOES = [box(f"domino_{i}", (0.02, 0.1), 0.05, (0.05 * i, 0.05, 0), (0.2, 0.04, -4) if i == 0 else (0, 0, 0))
             for i in range(5)]  # fmt: skip
 PLATE_2D = {"name": "plate", "kind": "box", "size": [0.01, 0.2], "center": [0, 0]}
 PLATE_3D = {"name": "plate", "kind": "box", "size": [0.01, 0.2, 0.2], "center": [0, 0, 0]}
@@ -597,7 +584,7 @@ add("dominoes", scene(1.0, DOMINOES, [FLOOR], 0.6),
     "when the last one has turned 0.3 rad: 0.558 s in MuJoCo with hard contacts at 10 µs, 0.561 s in ideal-friction "
     "at 0.1 ms", 0.02)
 add("fast_box_and_plate",
-    scene(0.1, [box("box", 0.01, 0.01, 0.05, (-0.497, 0, 0), (30, 0, 0))], [PLATE_2D], gravity=0.0),
+    scene(0.1, [box("box", (0.01, 0.01), 0.05, (-0.497, 0, 0), (30, 0, 0))], [PLATE_2D], gravity=0.0),
     beyond(-0.01), 0.0, 0.01, "stops before the middle of the plate", 0.5)
 add("fast_ball_and_plate",
     scene(0.1, [ball("ball", 0.01, 0.05, (-0.497, 0, 0), (50, 0, 0, 0, 0, 0))], [PLATE_3D], gravity=0.0),

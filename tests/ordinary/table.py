@@ -14,6 +14,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from iapb.errors import IapbError
 from iapb.run import Run
@@ -77,19 +78,10 @@ def motion_of(run: Run) -> Motion:
         place[..., :2], turn[..., 2, 2] = pose[..., :2], 1.0
         turn[..., 0, 0], turn[..., 0, 1], turn[..., 1, 0], turn[..., 1, 1] = c, -s, s, c
     else:
-        place, turn = pose[..., :3], _matrices(pose[..., 3:])
+        place, turn = pose[..., :3], Rotation.from_quat(pose[..., 3:].reshape(-1, 4)).as_matrix().reshape(turn.shape)
     free = pose.shape[2] == 7 and run.v.shape[1] >= 6 and run.velocity_names[3].endswith("rx")
     spin = np.einsum("nij,nj->ni", turn[:, 0], run.v[:, 3:6]) if free else np.zeros((count, 3))
     return Motion(run.time, place, turn, spin)
-
-
-def _matrices(turns: Floats) -> Floats:
-    """Return the rotations of quaternions x, y, z, w."""
-    x, y, z, w = np.moveaxis(turns / np.linalg.norm(turns, axis=-1, keepdims=True), -1, 0)
-    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]  # fmt: skip
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def energy_scale(scene: Scene) -> float:
@@ -112,30 +104,28 @@ def _size(shape: Any) -> float:
 # MuJoCo
 
 
-def run_mujoco(case: Case, scene: Scene, step: float = 1e-3, contact: str = "") -> Outcome:
-    """Run a case in MuJoCo; `contact` holds further attributes of its geometries."""
+def run_mujoco(case: Case, scene: Scene) -> Outcome:
+    """Run a case in MuJoCo."""
     import mujoco
 
     mujoco.set_mju_user_warning(lambda _: None)  # it would write a file
-    model = mujoco.MjModel.from_xml_string(mjcf(scene, step, contact))
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
     state = mujoco.MjData(model)
     _start(scene, state)
-    count, bodies, every = scene.steps, len(scene.bodies), round(1e-3 / step)
+    count, bodies = scene.steps, len(scene.bodies)
     place, turn, spin = np.zeros((count + 1, bodies, 3)), np.zeros((count + 1, bodies, 3, 3)), np.zeros((count + 1, 3))
     energy, worked = np.zeros(count + 1), 0.0
     held = [body.name for body in scene.bodies].index(scene.hand.body) + 1 if scene.hand else 0
     point = _push(scene, model, state, held) if held else None
     free = scene.bodies[0].joint == "free_flyer"
     for k in range(count + 1):
-        for j in range(every if k < count else 1):
-            if held:
-                before, point = point, _push(scene, model, state, held)
-                worked += float(np.dot(state.xfrc_applied[held, :3], point - before))
-            now = state.qvel[3:6].copy() if free else np.zeros(3)
-            mujoco.mj_step(model, state)  # its places and energies are those at the start of the step
-            if j == 0:
-                place[k], turn[k] = state.xpos[1:], state.xmat[1:].reshape(-1, 3, 3)
-                energy[k], spin[k] = state.energy.sum() - worked, turn[k, 0] @ now
+        if held:
+            before, point = point, _push(scene, model, state, held)
+            worked += float(np.dot(state.xfrc_applied[held, :3], point - before))
+        now = state.qvel[3:6].copy() if free else np.zeros(3)
+        mujoco.mj_step(model, state)  # its places and energies are those at the start of the step
+        place[k], turn[k] = state.xpos[1:], state.xmat[1:].reshape(-1, 3, 3)
+        energy[k], spin[k] = state.energy.sum() - worked, turn[k, 0] @ now
         if any(warning.number for warning in state.warning):
             return Outcome(math.inf, math.inf, 3, "MuJoCo warns of an unstable simulation")
     motion = Motion(np.arange(count + 1) * 1e-3, place, turn, spin)
@@ -148,7 +138,7 @@ def _start(scene: Scene, state: Any) -> None:
     for body in scene.bodies:
         at, speed = list(body.position), list(body.velocity)
         if body.joint in ("spherical", "free_flyer"):
-            turn = _matrices(np.array(at[-4:]))
+            turn = Rotation.from_quat(at[-4:]).as_matrix()
             at[-4:] = [at[-1], *at[-4:-1]]
             speed = [*(turn @ speed[:3]), *speed[3:]] if len(speed) == 6 else speed
         q += at
@@ -174,7 +164,7 @@ JOINTS = {
 }  # fmt: skip
 
 
-def mjcf(scene: Scene, step: float, contact: str = "") -> str:
+def mjcf(scene: Scene) -> str:
     """Return the scene for MuJoCo: boxes, spheres, prisms, planes; each body's frame is where ours is."""
     friction = scene.contact.friction
     geometry = f'condim="3" friction="{friction} 0 0"' if friction else 'condim="1"'
@@ -188,8 +178,8 @@ def mjcf(scene: Scene, step: float, contact: str = "") -> str:
         return "".join(_body(body, depth, meshes) + bodies(body.name) + "</body>" for body in inside.get(parent, []))
 
     world = "".join(_geom(wall, depth, meshes) for wall in scene.walls) + bodies("world")
-    return (f'<mujoco><compiler angle="radian"/><option timestep="{step}" gravity="{_text(scene.gravity or (0, 0))}">'
-            f'<flag energy="enable"/></option><default><geom {geometry} {contact}/></default>'
+    return (f'<mujoco><compiler angle="radian"/><option timestep="0.001" gravity="{_text(scene.gravity or (0, 0))}">'
+            f'<flag energy="enable"/></option><default><geom {geometry}/></default>'
             f'<asset>{"".join(meshes)}</asset><worldbody>{world}</worldbody></mujoco>')  # fmt: skip
 
 

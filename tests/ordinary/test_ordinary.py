@@ -13,15 +13,16 @@ from tests.ordinary.table import mjcf, outcome_of
 
 LAWS = {"IAPB": [*CASES], "PB": ["ball_rolls", "tower_5", "ratio_1e6", "arch", "peg_jams", "ladder_slips"],
         "ideal-friction": ["disc_rolls", "box_stays_on_slope", "bounce_50_percent", "ladder_stands"]}  # fmt: skip
+TOO_FAST = ("fast_box_and_plate", "fast_ball_and_plate")  # through a plate within a step: the run must say so
 MADE = 1e-4  # of the scene's energy: what the integration of a right run may make
 
 
 @pytest.mark.parametrize(("world", "name"), [(world, name) for world, names in LAWS.items() for name in names])
 def test_a_scene_is_right_or_its_run_says_that_it_is_not(world: str, name: str) -> None:
     outcome = outcome_of(CASES[name], world)
-    verdict = outcome.verdict(CASES[name])
-    assert verdict in ("right", "flagged"), f"{outcome.error / CASES[name].tolerance:.3g} tolerances off"
-    assert verdict != "right" or outcome.made < MADE
+    expected = "flagged" if name in TOO_FAST else "right"
+    assert outcome.verdict(CASES[name]) == expected, f"{outcome.error / CASES[name].tolerance:.3g} tolerances off"
+    assert name in TOO_FAST or outcome.made < MADE
 
 
 @pytest.mark.parametrize("name", ["spin_box_10", "ball_starts_to_roll", "disc_brakes_in_groove", "ladder_slips"])
@@ -43,6 +44,6 @@ def test_a_wrong_motion_and_a_broken_one_are_seen() -> None:
 def test_every_scene_translates(name: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     scene = scene_kind(CASES[name].scene).model_validate(CASES[name].scene)
-    model = mujoco.MjModel.from_xml_string(mjcf(scene, 1e-3))
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
     assert model.nbody == 1 + len(scene.bodies)
     assert float(model.body_mass.sum()) == pytest.approx(sum(body.mass for body in scene.bodies))

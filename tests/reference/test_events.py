@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,9 +18,10 @@ from reference.complementarity import ImpactProblem
 from reference.complementarity.laws import Outcome, poisson
 from reference.event_driven import LinearSystem, event_driven
 from reference.rigid_body import model_of
-from reference.rigid_step import nearest_velocity, rigid_step
+from reference.rigid_step import rigid_step
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
+from tests.reference.scenes import G, scene_of
 
 PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
 
@@ -34,19 +34,6 @@ def row_of_balls(masses: list[float], e: float) -> LinearSystem:
     """Balls on a line, coordinates left to right, radius absorbed."""
     n = len(masses)
     return LinearSystem(np.diag(masses), np.zeros(n), np.diff(np.eye(n), axis=0), np.zeros(n - 1), e)
-
-
-def moreau_jean(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int) -> tuple[np.ndarray, ...]:
-    """Moreau-Jean's scheme with theta = 1/2 (Jean, Comput. Methods Appl. Mech. Eng. 177, 1999): t, q, v, impulses."""
-    states = [(0.0, np.array(q), np.array(v), np.zeros(len(system.start)))]
-    for k in range(steps):
-        _, at, moving, _ = states[-1]
-        gamma = system.rows @ moving
-        bound = np.where(system.gap(at) + 0.5 * dt * gamma <= 0.0, -system.restitution * gamma, -np.inf)
-        free = moving + dt * np.linalg.solve(system.mass_matrix, system.force)
-        found = nearest_velocity(system.mass_matrix, free, system.rows, bound)
-        states.append(((k + 1) * dt, at + 0.5 * dt * (found.velocity + moving), found.velocity, found.impulse))
-    return tuple(np.array(part) for part in zip(*states, strict=True))
 
 
 def test_ball_bounces_at_the_times_of_the_textbook() -> None:
@@ -85,17 +72,6 @@ def test_a_resting_contact_opens_when_the_force_lifts_it_and_equal_elastic_balls
     assert exact.v[-1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-14)
 
 
-@pytest.mark.skipif(not (PROBLEMS / "trajectories").exists(), reason="shared problem files are not here")
-def test_moreau_ball_reproduces_the_siconos_reference() -> None:
-    reference = np.loadtxt(PROBLEMS / "trajectories" / "BouncingBallTS.ref", skiprows=1)
-    ours = np.column_stack(moreau_jean(ball(0.9), [1.0], [0.0], 0.005, len(reference) - 1))
-    assert np.abs(ours[:, [0, 1, 2, 3, 3]] - reference[:, :5]).max() <= 1e-12
-
-
-def moreau(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
-    return moreau_jean(system, q, v, dt, steps)[1:3]
-
-
 def anitescu(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
     states = [(np.array(q), np.array(v))]
     for _ in range(steps):
@@ -120,24 +96,23 @@ SCENES = {
 COARSE, FINE = (97, 130, 200, 231, 310), (1603, 2010, 2777, 3200, 4099)  # impacts fall anywhere in a step
 
 
-def error_per_step(scene: str, method: Callable, counts: tuple[int, ...]) -> np.ndarray:  # type: ignore[type-arg]
+def error_per_step(scene: str, counts: tuple[int, ...]) -> np.ndarray:
     """Largest error divided by the step, over step counts: positions in the sup norm, velocities in L1."""
     system, q, v, duration = SCENES[scene]
     exact = event_driven(system, q, v, duration)
     found = []
     for n in counts:
         dt = duration / n
-        stepped_q, stepped_v = method(system, q, v, dt, n)
+        stepped_q, stepped_v = anitescu(system, q, v, dt, n)
         true_q, true_v = exact.state(np.minimum(dt * np.arange(n + 1), exact.end))
         found.append([np.abs(stepped_q - true_q).max() / dt, np.abs(stepped_v - true_v).sum(axis=0).max()])
     return np.max(found, axis=0)
 
 
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("method", [moreau, anitescu])
-def test_time_stepping_converges_at_first_order(scene: str, method: Callable) -> None:  # type: ignore[type-arg]
+def test_time_stepping_converges_at_first_order(scene: str) -> None:
     """The worst error divided by the step stays the same from some 200 to some 3000 steps (a factor 16)."""
-    coarse, fine = (error_per_step(scene, method, counts) for counts in (COARSE, FINE))
+    coarse, fine = (error_per_step(scene, counts) for counts in (COARSE, FINE))
     assert (fine <= 1.5 * coarse + 1e-9).all(), (coarse, fine)
 
 
@@ -150,37 +125,17 @@ def test_the_law_of_the_impacts_is_the_callers() -> None:
     assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0, law=plastic).v[-1] == pytest.approx([0.5, 0.5])
 
 
-G = 9.81
-DROP = """
-name: drop
-dimensions: 3
-rate: 1000
-duration: 1
-gravity: [0, 0, -9.81]
-bodies:
-  - {name: ball, joint: free_flyer, mass: 0.5, inertia: [2e-4, 2e-4, 2e-4], shapes: [{kind: sphere, radius: 0.04}],
-     position: [0, 0, 0.24, 0, 0, 0, 1], velocity: [0.3, 0, 0, 2, 3, 1]}
-walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}]
-contact: {restitution: 0.6, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
-"""
-PENDULUM = """
-name: pendulum
-dimensions: 3
-rate: 1000
-duration: 1
-gravity: [0, 0, -9.81]
-bodies:
-  - {name: arm, joint: revolute, axis: [0, 1, 0], mass: 2, inertia: [1e-3, 0.03, 0.03], center_of_mass: [0.2, 0, 0],
-     shapes: [{kind: sphere, radius: 0.05, center: [0.4, 0, 0]}]}
-walls: [{name: wall, kind: half_space, point: [0, 0, -0.25], normal: [0, 0, 1]}]
-contact: {restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
-"""
+DROP = scene_of({"mass": 0.5, "inertia": [2e-4] * 3, "shapes": [{"kind": "sphere", "radius": 0.04}],
+                 "position": [0, 0, 0.24, 0, 0, 0, 1], "velocity": [0.3, 0, 0, 2, 3, 1]},
+                gravity=G, floor=0.0, contact={"restitution": 0.6})  # fmt: skip
+ARM = {"joint": "revolute", "axis": [0, 1, 0], "mass": 2, "inertia": [1e-3, 0.03, 0.03], "center_of_mass": [0.2, 0, 0],
+       "shapes": [{"kind": "sphere", "radius": 0.05, "center": [0.4, 0, 0]}]}  # fmt: skip
 
 
 def test_a_dropped_ball_is_the_ball_of_the_exact_events() -> None:
     """Two truths that share no code between events: arcs in closed form, and an integrator with root finding."""
     exact = event_driven(LinearSystem([[0.5]], [-0.5 * G], [[1.0]], [0.0], 0.6), [0.2], [0.0], 0.5)
-    truth = scene_truth(scene_from_text(DROP), 0.5)
+    truth = scene_truth(DROP, 0.5)
     time = np.linspace(0.0, 0.5, 51)
     assert truth.events == pytest.approx(exact.event_time[1:], abs=1e-9)
     q, _ = truth.state(time)
@@ -192,7 +147,8 @@ def test_a_dropped_ball_is_the_ball_of_the_exact_events() -> None:
 @pytest.mark.parametrize("restitution", [0.0, 0.4])
 def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(restitution: float) -> None:
     """½ I ω² = m g l sin(angle) at sin(angle) = 0.2/0.4; then −e ω, or rest with the gap held closed."""
-    truth = scene_truth(scene_from_text(PENDULUM % restitution), 0.3)
+    scene = scene_of(ARM, gravity=G, floor=-0.25, contact={"restitution": restitution})
+    truth = scene_truth(scene, 0.3)
     inertia, angle = 0.03 + 2.0 * 0.2**2, np.arcsin(0.5)
     speed = np.sqrt(2.0 * 2.0 * G * 0.2 * np.sin(angle) / inertia)
     struck = truth.events[0]
@@ -204,22 +160,15 @@ def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(rest
         assert q == pytest.approx(angle, abs=1e-9) and np.abs(v).max() <= 1e-9
 
 
-BOUNCING = """
-name: bouncing
-rate: 1000
-duration: 1
-gravity: [0, -9.81]
-bodies:
-  - {name: ball, joint: planar, mass: 0.5, inertia: 2e-4, shapes: [{kind: circle, radius: 0.04}],
-     position: [0, 0.09, 0], velocity: [0.3, 0, 0]}
-walls: [{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}]
-contact: {restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
-"""
+def bouncing(restitution: float) -> Scene:
+    ball = {"mass": 0.5, "inertia": 2e-4, "shapes": [{"kind": "circle", "radius": 0.04}], "position": [0, 0.09, 0],
+            "velocity": [0.3, 0, 0]}  # fmt: skip
+    return scene_of(ball, space=False, gravity=G, floor=0.0, contact={"restitution": restitution})
 
 
 def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
     """A ball from 5 cm, e = 0.5: it rests after 3 sqrt(2 h/g), infinitely many bounces later, and then slides on."""
-    truth = scene_truth(scene_from_text(BOUNCING % 0.5), 1.0)
+    truth = scene_truth(bouncing(0.5), 1.0)
     rests = 3.0 * np.sqrt(2.0 * 0.05 / G)
     falls = rests / 3.0 * (1.0 + 2.0 * (1.0 - 0.5 ** np.arange(len(truth.events))))
     assert truth.events == pytest.approx(falls, abs=2.0 * truth.bound.instant)
@@ -241,9 +190,9 @@ def test_a_tumbling_body_keeps_energy_and_angular_momentum() -> None:
 
 
 @pytest.mark.parametrize(("given", "error", "says"), [
-    ((lambda: scene_from_text(DROP + "hand: {body: ball}\n"), 0.1, True), ArgumentError, "a scene without quaternions"),
+    ((lambda: DROP.with_values({"hand": {"body": "body_0"}}), 0.1, True), ArgumentError, "a scene without quaternions"),
     ((lambda: load_scene(find_scene("box_stack")), 0.1), SolverError, "box_stack: .* contacts overlap"),
-    ((lambda: scene_from_text(BOUNCING % 0.97), 6.0, False, 20), SolverError, "impacts accumulate, 20 before"),
+    ((lambda: bouncing(0.97), 6.0, False, 20), SolverError, "impacts accumulate, 20 before"),
 ])  # fmt: skip
 def test_refusals(given: Any, error: type[Exception], says: str) -> None:
     make, *options = given
@@ -251,7 +200,7 @@ def test_refusals(given: Any, error: type[Exception], says: str) -> None:
         scene_truth(make(), *options)
 
 
-ARM = """
+LIMITED = """
 name: arm
 rate: 2000
 duration: 0.6
@@ -266,7 +215,7 @@ contact: {stiffness: 2e5, damping: 60, restitution: 0.0}
 
 
 def limited_arm(**values: object) -> Scene:
-    return scene_from_text(ARM).with_values(values)
+    return scene_from_text(LIMITED).with_values(values)
 
 
 @pytest.mark.parametrize("world", ["IAPB", "ideal"])
@@ -283,15 +232,9 @@ def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str
 @pytest.mark.parametrize("damping", [1.0, 100.0, 900.0])
 def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
     """m = 1 kg, e = 1: v⁺ = −v⁻ of the step's start, and damping divides it by 1 + dt D in the same step."""
-    run = run_world(scene_from_text(f"""
-name: slider
-rate: 1000
-duration: 0.005
-bodies:
-  - {{name: a, joint: prismatic, axis: [1, 0], mass: 1, inertia: 0.01, joint_damping: {damping},
-     joint_limits: [-9, 0.1], velocity: [1000]}}
-contact: {{restitution: 1}}
-"""), "ideal")
+    slider = {"joint": "prismatic", "axis": [1, 0], "inertia": 0.01, "joint_damping": damping,
+              "joint_limits": [-9, 0.1], "velocity": [1000]}  # fmt: skip
+    run = run_world(scene_of(slider, space=False, duration=0.005, contact={"restitution": 1}), "ideal")
     (step,), impacts = run.impacts.step, run.impacts
     came = 1000.0 / (1.0 + 1e-3 * damping) ** step
     assert impacts.v_minus[0] == run.v[step] == pytest.approx([came], rel=1e-12)

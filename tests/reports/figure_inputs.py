@@ -14,7 +14,7 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from iapb.scene.mechanism import mechanism_of
 from reports.figures import RECIPES, complementarity, energy_gains, mechanics
-from reports.figures.two_link_arm import arm_energies
+from reports.figures.paper import arm_energies
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
 from verification.cost.impacts import WAYS
@@ -164,7 +164,8 @@ def made_motion(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
                    scene_name=scene, scene_resolved=resolved)
     late = np.where(np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets)  # nothing touches before
     run = replace(run, contacts=replace(run.contacts, offsets=late, point=0.01 * run.contacts.point))
-    return replace(run, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
+    force = np.sin(np.outer(30 * time[1:] + seed, [1.0, 2.0, 3.0])) * [1.0, 1.0, 0.02]
+    return replace(run, device_force=force, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
 
 
 def all_inputs(make_run: Callable[..., Run]) -> dict[str, Any]:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +14,6 @@ from reports.campaign import Campaign
 from reports.cli import main
 from reports.counterexamples import CampaignRequest, keep_counterexample, recheck
 from reports.store.impact import read_broken_impact, write_broken_impact
-from reports.store.tables import read_record
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
 from verification.laws.planted import doubled_impulse
@@ -50,7 +46,9 @@ def test_batches_do_not_depend_on_how_they_are_cut(tmp_path: Path) -> None:
     assert whole.counts([Batch(IMPACTS, 0, 20)]) == cut.counts(BATCHES)
 
 
-def test_another_resolver_or_tolerance_has_another_folder() -> None:
+def test_another_resolver_or_tolerance_has_another_folder_and_a_file_that_is_not_there_is_named() -> None:
+    with pytest.raises(RunFileError, match="no such file"):
+        list(recheck(Path("absent.h5")))
     keys = {request.key() for request in (SOUND, BROKEN, replace(SOUND, bounds="FACTORED"), replace(SOUND, seed=1))}
     assert len(keys) == 4
     assert replace(SOUND, workers=2, impacts=7).key() == SOUND.key()
@@ -113,38 +111,6 @@ def test_the_plan_covers_every_part_once() -> None:
     assert all(first + count == following for (first, count), (following, _) in zip(impacts, impacts[1:], strict=False))
     assert sum(batch.count for batch in batches if batch.part == TRAJECTORIES) == 5000
     assert any(batch.part == UNEQUAL for batch in batches)
-
-
-_ENDLESS = """
-import sys
-from pathlib import Path
-from reports.campaign import Campaign
-from reports.counterexamples import CampaignRequest
-from verification.laws.campaign import IMPACTS, Batch
-request = CampaignRequest("verification.laws:sound_resolver", "KIT", 1e8, 60, 0, 0, 1)
-Campaign(Path(sys.argv[1]), request).run([Batch(IMPACTS, first, 5) for first in range(0, 10**5, 5)], lambda *told: None)
-"""
-
-
-def test_a_killed_process_leaves_whole_batches_that_are_not_done_again(tmp_path: Path) -> None:
-    process = subprocess.Popen([sys.executable, "-c", _ENDLESS, str(tmp_path)], cwd=Path(__file__).parents[2])
-    try:
-        while len(list(tmp_path.glob("*/impacts-*.h5"))) < 2:
-            assert process.poll() is None
-            time.sleep(0.05)
-    finally:
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-    paths = sorted(tmp_path.glob("*/impacts-*.h5"))
-    assert all(sum(law["checked"] for law in read_record(path)["laws"]) > 0 for path in paths)
-    times = {path: path.stat().st_mtime_ns for path in paths}
-    Campaign(tmp_path, SOUND).run([Batch(IMPACTS, 5 * k, 5) for k in range(len(paths))], _silent)
-    assert {path: path.stat().st_mtime_ns for path in paths} == times
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RunFileError, match="no such file"):
-        list(recheck(tmp_path / "absent.h5"))
 
 
 def test_what_is_stopped_tells_what_there_is(

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from reports.evidence.stage import Stage
 from reports.pages.matrix import MARKS, decade, matrices, worst_first
 from reports.pages.records import Evidence
 from reports.runner import Runner
@@ -15,7 +14,7 @@ from tests.reports.joined import joined
 from verification.finding import Finding, finding_of
 from verification.hard_cases import study
 from verification.hard_cases.study import STABLE
-from verification.table import Column, Table, table_of
+from verification.table import Table, table_from
 
 CHOSEN = ("grazing", "nearly_parallel_normals", "chatter")
 
@@ -49,18 +48,6 @@ def test_every_case_is_a_record_with_a_row_for_each_method(cases: tuple[Finding,
     assert len(summary(cases).rows) == sum(len(case.parts) for case in cases)
 
 
-def test_a_note_has_a_column_only_where_there_is_one(cases: tuple[Finding, ...]) -> None:
-    tables = [table for case in cases for table in case.tables.values()]
-    assert all("note" not in table.keys or any(table.column("note")) for table in tables)
-    assert "note" not in cases[0].tables[cases[0].key].keys
-
-
-def test_records_are_read_back_as_they_were(cases: tuple[Finding, ...], tmp_path: Path) -> None:
-    stage = Stage(tmp_path, "hard_cases", tuple[Finding, ...], {})
-    assert stage.get_or_compute(lambda: cases) == cases
-    assert stage.get_or_compute(lambda: pytest.fail("computed twice")) == cases
-
-
 def test_the_matrix_shows_every_case_and_method(cases: tuple[Finding, ...]) -> None:
     impacts, motions = matrices(summary(cases))
     assert (impacts.title, motions.title) == ("Impacts, by method", "Motions, by world")
@@ -76,9 +63,8 @@ def test_what_we_fail_stands_first_then_the_largest_share_of_what_is_allowed() -
         return [same | {"method": "factored", "outcome": outcome, "forward error": error},
                 same | {"method": "svd", "outcome": other, "forward error": 1.0}]
 
-    found = table_of([Column(key) for key in rows("", "", 0.0)[0]],
-                     [*rows("calm", STABLE, 1e-16), *rows("close", STABLE, 9e-11),
-                      *rows("others fail", STABLE, 1e-16, "wrong motion"), *rows("ours", "wrong motion", 1e-12)])
+    found = table_from([*rows("calm", STABLE, 1e-16), *rows("close", STABLE, 9e-11),
+                        *rows("others fail", STABLE, 1e-16, "wrong motion"), *rows("ours", "wrong motion", 1e-12)])
     (matrix,) = matrices(found)
     assert [case for case, _ in matrix.rows] == ["ours", "close", "others fail", "calm"]
     alone = [finding_of(case, case, "", "", (), {case: found.where(case=case)}) for case in ("calm", "close", "ours")]
@@ -91,14 +77,11 @@ def test_the_page_says_the_verdict_before_the_decade(cases: tuple[Finding, ...])
     assert re.search(r'✕</span> gains energy</span> <span class="decade">10[⁻\d⁰¹²³⁴-⁹]+</span>', page)
 
 
-def test_no_two_verdicts_look_alike() -> None:
-    assert len({mark for mark, _ in MARKS.values()}) == len(MARKS)
-
-
 @pytest.mark.parametrize(("value", "text"), [(2e-16, "10⁻¹⁶"), (0.3, "10⁻¹"), (2.0, "10⁰"), (0.0, ""), (None, "")])
 def test_the_decade_of_a_value(value: float | None, text: str) -> None:
     assert decade(value) == text
 
 
-def test_without_cases_there_is_no_matrix() -> None:
+def test_verdicts_look_different_and_without_cases_there_is_no_matrix() -> None:
+    assert len({mark for mark, _ in MARKS.values()}) == len(MARKS)
     assert matrices(Table(summary(()).columns)) == ()

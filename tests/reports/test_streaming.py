@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,11 @@ from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED
 from reference.worlds import run_world
 from reports.runner import Runner
-from reports.store.care import LEFTOVER, PARTIAL, check_store, garbage
+from reports.store.care import LEFTOVER, PARTIAL, check_store, garbage, parts_of_killed
 from reports.store.keys import content_hash
-from reports.store.logs import CHUNK, STATE, LogLocked, RunLog, read_log
-from reports.store.runs import opened_run, read_run
-from reports.streaming import logs_of_killed, recover
+from reports.store.parts import Parts, PartsLocked, parts_of, read_parts
+from reports.store.runs import opened_run, read_entry, read_run
+from reports.streaming import recover
 
 # planar with impacts and a device; a tool that is carried; space, contacts and no device; a law in Python
 CASES = [("peg_corner", "IAPB", 3000), ("peg_corner", "CBuc", 2500), ("arm_obstacles", "PB", 1200),
@@ -31,138 +32,126 @@ def scene_of(name: str, steps: int) -> Scene:
 
 
 @pytest.fixture(autouse=True)
-def a_state_in_every_block(monkeypatch: pytest.MonkeyPatch) -> None:
+def a_part_for_every_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(streaming, "PAUSE", 0.0)
-    monkeypatch.setattr(streaming, "_STATE_SHARE", 1e9)
+    monkeypatch.setattr(streaming, "_PARTS_SHARE", 1e9)
     monkeypatch.setattr(streaming, "HELD", 1)
 
 
-def whole(name: str, world: str, steps: int) -> str:
-    return content_hash(run_world(scene_of(name, steps), world))
-
-
-@pytest.mark.parametrize(("name", "world", "steps"), CASES)
-def test_a_streamed_run_has_the_content_of_one_held_in_memory(
-    tmp_path: Path, name: str, world: str, steps: int
-) -> None:
-    place, streamed = Runner(tmp_path).stream(scene_of(name, steps), world)
-    assert streamed.entry.content_hash == whole(name, world, steps) == content_hash(read_run(place.path))
-    with opened_run(place.path) as (run, _):
-        assert run.steps == steps and run.chunk_steps[:].sum() == steps
-    assert {path.suffix for path in tmp_path.iterdir()} == {".h5", ".json"}  # no log is left
-
-
-class Interrupting:
+def stop_after(chunks: int) -> object:
     """Ctrl-C after some chunks."""
-
-    def __init__(self, chunks: int) -> None:
-        self.left = chunks
-
-    def __call__(self, done: int, total: int) -> None:
-        self.left -= 1
-        if self.left == 0:
+    def progress(done: int, total: int) -> None:
+        if done >= 512 * chunks:
             raise KeyboardInterrupt
 
+    return progress
+
 
 @pytest.mark.parametrize(("name", "world", "steps"), CASES)
-def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path: Path, name: str, world: str, steps: int) -> None:
-    runner = Runner(tmp_path, Interrupting(2))
-    place, stopped = runner.stream(scene_of(name, steps), world)
-    assert (stopped.stopped, stopped.entry) == (INTERRUPTED, None)
+def test_a_streamed_run_stopped_or_not_has_the_content_of_one_held_in_memory(
+    tmp_path: Path, name: str, world: str, steps: int
+) -> None:
+    scene = scene_of(name, steps)
+    held = content_hash(run_world(scene, world))
+    place, streamed = Runner(tmp_path / "whole").stream(scene, world)
+    assert not streamed.stopped and held == read_entry(place.path).content_hash == content_hash(read_run(place.path))
+    with opened_run(place.path) as (run, _):
+        assert run.steps == steps and run.chunk_steps[:].sum() == steps
+    runner = Runner(tmp_path, stop_after(2))
+    place, stopped = runner.stream(scene, world)
+    assert stopped.stopped == INTERRUPTED and stopped.resumable and not place.path.exists()
     assert read_run(place.partial).steps == 2 * 512
     runner.progress = None
-    place, streamed = runner.stream(scene_of(name, steps), world, resume=True)
-    assert streamed.resumed_at == 512 and streamed.entry.content_hash == whole(name, world, steps)
-    assert not list(tmp_path.glob("*.partial")) and not list(tmp_path.glob("*.log"))
+    place, streamed = runner.stream(scene, world, resume=True)
+    assert streamed.resumed_at == 512 and read_entry(place.path).content_hash == held
+    assert {path.suffix for path in tmp_path.rglob("*.*")} == {".h5", ".json"}  # no part is left
 
 
+@pytest.fixture
 def killed(tmp_path: Path) -> tuple[Path, Scene]:
-    """The log that a process leaves which is killed in its fifth chunk."""
+    """The parts that a process leaves which is killed in its fifth chunk, and its scene."""
     scene = scene_of("peg_corner", 4000)
     process = os.fork()
     if process == 0:
         Runner(tmp_path, lambda done, total: os._exit(9) if done > 2048 else None).stream(scene, "IAPB")
     os.waitpid(process, 0)
-    [log] = tmp_path.glob("*.log")
-    return log, scene
+    [parts] = tmp_path.glob("*.parts")
+    return parts, scene
 
 
-def test_what_a_kill_cut_off_anywhere_is_computed_again(tmp_path: Path) -> None:
-    log, scene = killed(tmp_path)
-    content, right = log.read_bytes(), whole("peg_corner", "IAPB", 4000)
-    states = [block.end for block in read_log(log)[1] if block.line["kind"] == STATE]
-    rng = np.random.default_rng(0)
-    cuts = [0, 10, states[0] - 1, states[0], len(content) - 1, *rng.integers(0, len(content), 4)]
-    for cut in map(int, cuts):
-        log.write_bytes(content[:cut])
-        if cut < 50:
-            with pytest.raises(RunFileError, match="no log"):
-                Runner(tmp_path).stream(scene, "IAPB", resume=True)
-            continue
-        place, streamed = Runner(tmp_path).stream(scene, "IAPB", resume=True)
-        assert streamed.resumed_at == 512 * sum(end <= cut for end in states)
-        assert streamed.entry.content_hash == right
+def flip(path: Path, share: float) -> None:
+    content = bytearray(path.read_bytes())
+    content[int(share * len(content))] ^= 1
+    path.write_bytes(content)
+
+
+def test_what_is_cut_off_damaged_lost_doubled_or_exchanged_is_computed_again(killed: tuple[Path, Scene]) -> None:
+    parts, scene = killed
+    whole, right = parts.with_name("whole"), content_hash(run_world(scene, "IAPB"))
+    shutil.copytree(parts, whole)
+    names = sorted(path.name for path in parts.glob("*.part"))
+    assert len(names) == 5  # the head, and four chunks
+    harms = {
+        "cut": lambda one, other: os.truncate(one, one.stat().st_size // 2),
+        "cut to nothing": lambda one, other: os.truncate(one, 0),
+        "damaged in its line": lambda one, other: flip(one, 0.01),
+        "damaged in its numbers": lambda one, other: flip(one, 0.7),
+        "lost": lambda one, other: one.unlink(),
+        "doubled": lambda one, other: shutil.copy(other, one),
+        "exchanged": lambda one, other: (shutil.copy(one, one.with_name("x")), shutil.copy(other, one),
+                                         os.replace(one.with_name("x"), other)),
+    }  # fmt: skip
+    for k, (harm, harmed) in enumerate((harm, at) for harm in harms for at in (2, 4)):
+        shutil.rmtree(parts, ignore_errors=True)
+        shutil.copytree(whole, parts)
+        harms[harm](parts / names[harmed], parts / names[3])
+        assert len(list(read_parts(parts))) == (2 if harm == "exchanged" and harmed == 4 else harmed - 1), (k, harm)
+        place, streamed = Runner(parts.parent).stream(scene, "IAPB", resume=True)
+        assert streamed.resumed_at == 512 * (2 if harm == "exchanged" and harmed == 4 else harmed - 1)
+        assert read_entry(place.path).content_hash == right
         place.path.unlink()
+    shutil.copytree(whole, parts)
+    flip(parts / names[0], 0.5)
+    with pytest.raises(RunFileError, match="first part"):
+        Runner(parts.parent).stream(scene, "IAPB", resume=True)
+    _, streamed = Runner(parts.parent).stream(scene, "IAPB")
+    assert not streamed.resumed_at and not parts.exists()
 
 
-def test_a_damaged_log_goes_on_from_before_the_damage(tmp_path: Path) -> None:
-    log, scene = killed(tmp_path)
-    content, blocks = log.read_bytes(), list(read_log(log)[1])
-    states = [number for number, block in enumerate(blocks) if block.line["kind"] == STATE]
-    for number in (states[-1], states[-1] - 1, states[0] + 1):
-        block = blocks[number]
-        for place in (block.start + 30, block.end - 5):  # in its line, in its numbers
-            log.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1:])
-            place, streamed = Runner(tmp_path).stream(scene, "IAPB", resume=True)
-            assert streamed.resumed_at == 512 * sum(each < number for each in states)
-            assert streamed.entry.content_hash == whole("peg_corner", "IAPB", 4000)
-            place.path.unlink()
-
-
-def test_a_block_that_is_lost_doubled_or_exchanged_ends_the_log(tmp_path: Path) -> None:
-    log, _ = killed(tmp_path)
-    content, blocks = log.read_bytes(), list(read_log(log)[1])
-    head, pieces = content[: blocks[0].start], [content[each.start : each.end] for each in blocks]
-    chunks = [number for number, each in enumerate(blocks) if each.line["kind"] == CHUNK]
-    first, second = chunks[1:3]
-    swapped = [*pieces]
-    swapped[first], swapped[second] = pieces[second], pieces[first]
-    for wrong in (pieces[:first] + pieces[first + 1 :], [*pieces[:first], pieces[first - 1], *pieces[first:]], swapped):
-        log.write_bytes(head + b"".join(wrong))
-        assert len(list(read_log(log)[1])) == first
-
-
-def test_a_log_of_another_run_or_of_nobody_is_refused(tmp_path: Path) -> None:
-    log, _ = killed(tmp_path)
+def test_parts_of_another_run_or_of_nobody_are_refused_and_left(killed: tuple[Path, Scene], tmp_path: Path) -> None:
+    parts, _ = killed
     other = scene_of("peg_corner", 4100)
-    place, _ = Runner(tmp_path, Interrupting(1)).stream(other, "IAPB")
-    streaming.log_of(place.path).write_bytes(log.read_bytes())
+    place, _ = Runner(tmp_path, stop_after(1)).stream(other, "IAPB")
+    shutil.rmtree(parts_of(place.path), ignore_errors=True)
+    shutil.copytree(parts, parts_of(place.path))
     with pytest.raises(RunFileError, match="another run"):
         Runner(tmp_path).stream(other, "IAPB", resume=True)
-    foreign = tmp_path / "foreign.h5.log"
-    foreign.write_bytes(Path(__file__).read_bytes())
-    with pytest.raises(RunFileError, match="no log"):
-        read_log(foreign)
-    with pytest.raises(RunFileError, match="not a log"):
-        RunLog(foreign, {})
-    assert foreign.read_bytes() == Path(__file__).read_bytes()
+    shutil.rmtree(parts_of(place.path))
+    theirs = parts_of(place.path) / "00000001.part"
+    theirs.parent.mkdir()
+    theirs.write_text("somebody else's")
+    with pytest.raises(RunFileError):
+        Runner(tmp_path).stream(other, "IAPB", resume=True)
+    with pytest.raises(RunFileError, match="only 0 of"):
+        Runner(tmp_path).stream(other, "IAPB")
+    assert theirs.read_text() == "somebody else's" and not place.path.exists()
 
 
-def test_two_processes_do_not_write_one_log(tmp_path: Path) -> None:
-    held = RunLog(tmp_path / "x.h5.log", {})
-    with pytest.raises(LogLocked):
-        RunLog(tmp_path / "x.h5.log", {})
+def test_two_processes_do_not_write_one_run(tmp_path: Path) -> None:
+    held = Parts(tmp_path / "x.h5.parts", {})
+    with pytest.raises(PartsLocked):
+        Parts(tmp_path / "x.h5.parts", {})
     held.close()
-    RunLog(tmp_path / "x.h5.log", {}).close(remove=True)
+    Parts(tmp_path / "x.h5.parts", {}).close(remove=True)
     assert not list(tmp_path.iterdir())
 
 
-def test_repair_makes_what_a_killed_run_did_readable(tmp_path: Path) -> None:
-    log, scene = killed(tmp_path)
-    run = scene_of("peg_corner", 2048)
+def test_repair_makes_what_a_killed_run_did_readable(killed: tuple[Path, Scene], tmp_path: Path) -> None:
+    _, scene = killed
     assert [state.state for state in check_store(tmp_path)] == [LEFTOVER] and not garbage(tmp_path)
-    [partial] = map(recover, logs_of_killed(tmp_path))
-    assert np.array_equal(read_run(partial).q, run_world(run, "IAPB").q)
+    [partial] = map(recover, parts_of_killed(tmp_path))
+    assert np.array_equal(read_run(partial).q, run_world(scene_of("peg_corner", 2048), "IAPB").q)
     assert PARTIAL in [state.state for state in check_store(tmp_path)]
-    _, streamed = Runner(tmp_path).stream(scene, "IAPB", resume=True)
-    assert streamed.resumed_at == 2048 and streamed.entry.content_hash == whole("peg_corner", "IAPB", 4000)
+    place, streamed = Runner(tmp_path).stream(scene, "IAPB", resume=True)
+    assert streamed.resumed_at == 2048
+    assert read_entry(place.path).content_hash == content_hash(run_world(scene, "IAPB"))

@@ -30,78 +30,69 @@ _MOST_CHANGES = 4  # per case: more, and the first mistake hides the others
 _NEST = 40  # levels; a scene has seven
 
 
+def changes(rng: Rng) -> range:
+    """Return a range of a random number of changes."""
+    return range(int(rng.integers(1, 1 + _MOST_CHANGES)))
+
+
+def chosen(rng: Rng, values: Any) -> Any:
+    """Return one of the values."""
+    return values[int(rng.integers(len(values)))]
+
+
 def damaged_bytes(content: bytes, rng: Rng) -> bytes:
     """Return the bytes with some flipped, lost, repeated, replaced or cut off."""
-    for _ in range(int(rng.integers(1, 1 + _MOST_CHANGES))):
+    for _ in changes(rng):
         at, length = int(rng.integers(len(content) + 1)), int(2 ** rng.uniform(0, 8))
-        piece, kind = content[at : at + length], int(rng.integers(6))
-        if kind == 0 and at < len(content):
-            content = content[:at] + bytes([content[at] ^ (1 << int(rng.integers(8)))]) + content[at + 1 :]
-        elif kind == 1:
-            content = content[:at] + content[at + length :]
-        elif kind == 2:
-            content = content[:at] + piece + content[at:]
-        elif kind == 3:
-            content = content[:at] + rng.bytes(len(piece)) + content[at + len(piece) :]
-        elif kind == 4:
-            content = content[:at] + bytes([int(rng.choice([0, 255]))]) * len(piece) + content[at + len(piece) :]
-        else:
-            content = content[:at]
+        before, piece, after = content[:at], content[at : at + length], content[at + length :]
+        flipped = bytes([content[at] ^ (1 << int(rng.integers(8)))]) + content[at + 1 :] if at < len(content) else b""
+        content = before + chosen(rng, [flipped, after, piece + piece + after, rng.bytes(len(piece)) + after,
+                                        bytes(len(piece)) + after, b"\xff" * len(piece) + after, b""])  # fmt: skip
     return content
 
 
 def damaged_text(text: str, rng: Rng, other: str = "") -> bytes:
     """Return the text with tokens put in, lines and words lost, moved or repeated, or the end of another text."""
-    for _ in range(int(rng.integers(1, 1 + _MOST_CHANGES))):
-        at, token = int(rng.integers(len(text) + 1)), TOKENS[int(rng.integers(len(TOKENS)))]
-        lines, kind = text.split("\n"), int(rng.integers(9))
+    for _ in changes(rng):
+        at, lines = int(rng.integers(len(text) + 1)), text.split("\n")
         line, to = (int(rng.integers(len(lines))) for _ in range(2))
-        if kind == 0:
-            text = text[:at] + token + text[at:]
-        elif kind == 1:
-            text = text[:at] + text[at + int(rng.integers(1, 30)) :]
-        elif kind == 2:
-            text = "\n".join(_with_word(lines, line, token, rng))
-        elif kind == 3:
-            text = "\n".join(lines[:line] + lines[line + 1 :])
-        elif kind == 4:
-            text = "\n".join([*lines[:to], lines[line], *lines[to:]])
-        elif kind == 5:
-            lines[line] = " " * int(rng.integers(1, 4)) + lines[line] if rng.random() < 0.5 else lines[line].lstrip()
-            text = "\n".join(lines)
-        elif kind == 6 and other:
-            text = text[:at] + other[int(rng.integers(len(other))) :]
-        elif kind == 7:
-            text = text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at:]
-        elif rng.random() < 0.3:
-            text = text[:at]
+        words = lines[line].split(" ")
+        words[int(rng.integers(len(words)))] = token = str(chosen(rng, TOKENS))
+        shifted = " " * int(rng.integers(1, 4)) + lines[line] if rng.random() < 0.5 else lines[line].lstrip()
+        text = chosen(rng, [
+            text[:at] + token + text[at:],
+            text[:at] + text[at + int(rng.integers(1, 30)) :],
+            text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at:],
+            text[:at] + (other[int(rng.integers(len(other))) :] if other else ""),
+            "\n".join([*lines[:line], " ".join(words), *lines[line + 1 :]]),
+            "\n".join([*lines[:line], shifted, *lines[line + 1 :]]),
+            "\n".join(lines[:line] + lines[line + 1 :]),
+            "\n".join([*lines[:to], lines[line], *lines[to:]]),
+        ])  # fmt: skip
     return damaged_bytes(text.encode(), rng) if rng.random() < 0.1 else text.encode()
-
-
-def _with_word(lines: list[str], line: int, token: str, rng: Rng) -> list[str]:
-    """Replace one word of a line: a value, most often."""
-    words = lines[line].split(" ")
-    words[int(rng.integers(len(words)))] = token
-    return [*lines[:line], " ".join(words), *lines[line + 1 :]]
 
 
 def damaged_values(plain: Any, rng: Rng) -> Any:
     """Return plain values (mappings, lists, numbers, texts) with some replaced, lost, renamed, repeated or nested."""
     plain = copy.deepcopy(plain)
-    for _ in range(int(rng.integers(1, 1 + _MOST_CHANGES))):
+    for _ in changes(rng):
         places = list(_places(plain))
         if not places:
             return plain
-        owner, key = places[int(rng.integers(len(places)))]
-        kind, value = int(rng.integers(6)), copy.deepcopy(VALUES[int(rng.integers(len(VALUES)))])
+        (owner, key), (other, where) = chosen(rng, places), chosen(rng, places)
+        kind, taken = int(rng.integers(7)), copy.deepcopy(other[where])
         if kind <= 1:
-            owner[key] = value
+            owner[key] = copy.deepcopy(chosen(rng, VALUES))
         elif kind == 2:
             del owner[key]
         elif kind == 3:
-            _copy_beside(owner, key, plain, places, rng)
+            owner[key] = taken
+        elif kind == 4 and isinstance(owner, list):
+            owner.insert(key, taken)
         elif kind == 4:
-            owner[key] = _scaled(owner[key], rng)
+            owner[f"{key}s"] = owner.pop(key)
+        elif kind == 5 and isinstance(owner[key], int | float):
+            owner[key] = float(owner[key]) * float(10.0 ** rng.integers(-12, 12)) * float(rng.choice([-1.0, 1.0]))
         else:
             for _ in range(int(rng.choice([1, 1, 2, _NEST]))):
                 owner[key] = [owner[key]] if rng.random() < 0.5 else {"name": owner[key]}
@@ -114,21 +105,3 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
         for key in list(value) if isinstance(value, dict) else range(len(value)):
             yield value, key
             yield from _places(value[key])
-
-
-def _copy_beside(owner: Any, key: Any, plain: Any, places: list[tuple[Any, Any]], rng: Rng) -> None:
-    """A value from elsewhere takes this place, or one more item joins a list, or a field gets another name."""
-    other, where = places[int(rng.integers(len(places)))]
-    taken = copy.deepcopy(other[where])
-    if isinstance(owner, list):
-        owner.insert(key, taken if rng.random() < 0.5 else copy.deepcopy(owner[key]))
-    elif rng.random() < 0.5:
-        owner[key] = taken
-    else:
-        owner[f"{key}s"] = owner.pop(key)
-
-
-def _scaled(value: Any, rng: Rng) -> Any:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return value
-    return float(value) * float(10.0 ** rng.integers(-12, 12)) * float(rng.choice([-1.0, 1.0]))

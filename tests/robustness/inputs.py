@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from iapb import decide_effects, load_scene, simulate
 from iapb.errors import IapbError, RunFileError
 from iapb.mechanics.urdf import read_collisions, read_urdf
 from iapb.recording import Recorder
-from iapb.scene import Scene, find_scene, scene_folder
+from iapb.scene import find_scene, scene_folder
 from iapb.scene.document import Document
 from iapb.simulation import Simulation
 from reference.complementarity.problem import ImpactProblem
@@ -36,17 +36,18 @@ from reference.worlds import find_world
 from reports.cli import main
 from reports.commands.inspect import inspect
 from reports.live.deadline import TICK_COLUMNS
-from reports.live.replay import finish_live, is_live, open_log
+from reports.live.replay import finish_live, is_live, open_parts
 from reports.store.folder import Place
 from reports.store.io import sealed
 from reports.store.keys import content_hash
-from reports.store.logs import RunLog, read_log
+from reports.store.parts import Parts
 from reports.store.runs import read_entry
-from reports.store.tables import Column, Table, read_table, write_table
-from reports.streaming import log_head, recover, stream
+from reports.store.tables import read_table, write_table
+from reports.streaming import Stream, parts_head, recover
 from reports.sweeps.study import load_study, points_of, scene_of
-from tests.robustness.damage import TOKENS, Rng, damaged_bytes, damaged_text, damaged_values
-from tests.robustness.faults import inputs_of, open_store, sample_run
+from tests.robustness.damage import TOKENS, Rng, changes, chosen, damaged_bytes, damaged_text, damaged_values
+from tests.robustness.faults import put
+from verification.table import titled
 
 _STEPS = 3  # of a scene that is read all the same: it must also start
 
@@ -64,7 +65,7 @@ class Kind:
     name: str
     samples: Callable[[], dict[str, bytes]]
     damaged: Callable[[bytes, bytes, Rng], bytes]
-    read: Callable[[Path], None]
+    read: Callable[[Path], Any]
     share: float = 1.0
 
 
@@ -73,14 +74,17 @@ def prepare(folder: Path) -> None:
     shutil.copytree(scene_folder() / "robots", folder / "robots", dirs_exist_ok=True)
 
 
-def _text_or_bytes(sample: bytes, other: bytes, rng: Rng) -> bytes:
-    return damaged_text(sample.decode(), rng, other.decode())
+def _as_text(sample: bytes, other: bytes, rng: Rng) -> bytes:
+    """Texts as texts; what is compressed, as bytes."""
+    if sample[:2] == b"\x1f\x8b":
+        return damaged_bytes(sample, rng)
+    return damaged_text(sample.decode(), rng, "" if other[:2] == b"\x1f\x8b" else other.decode())
 
 
-def _scene_or_text(sample: bytes, other: bytes, rng: Rng) -> bytes:
+def _as_values(sample: bytes, other: bytes, rng: Rng) -> bytes:
     """Half of the cases are damaged as values: they are always YAML, and get past the first look."""
     if rng.random() < 0.5:
-        return _text_or_bytes(sample, other, rng)
+        return _as_text(sample, other, rng)
     return json.dumps(damaged_values(_plain(sample), rng)).encode()
 
 
@@ -89,21 +93,13 @@ def _plain(sample: bytes) -> Any:
     return Document(sample.decode()).value
 
 
-def _only_bytes(sample: bytes, other: bytes, rng: Rng) -> bytes:
+def _as_bytes(sample: bytes, other: bytes, rng: Rng) -> bytes:
     return damaged_bytes(sample, rng)
 
 
-@cache
-def _scene_texts() -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in sorted(scene_folder().glob("*.yaml"))}
-
-
-def _planar() -> dict[str, bytes]:
-    return {name: text for name, text in _scene_texts().items() if b"\ndimensions: 3" not in text}
-
-
-def _spatial() -> dict[str, bytes]:
-    return {name: text for name, text in _scene_texts().items() if b"\ndimensions: 3" in text}
+def _shipped(pattern: str) -> Callable[[], dict[str, bytes]]:
+    """Return the files of the scenes' folder, read once."""
+    return cache(lambda: {path.name: path.read_bytes() for path in sorted(scene_folder().glob(pattern))})
 
 
 def _read_scene(path: Path) -> None:
@@ -113,27 +109,15 @@ def _read_scene(path: Path) -> None:
     simulate(scene, steps=min(_STEPS, scene.steps))
 
 
-def _studies() -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in sorted((scene_folder() / "sweeps").glob("*.yaml"))}
-
-
 def _read_study(path: Path) -> None:
     """Read it, find its scene, and spell out its first points."""
     study = load_study(path)
     list(islice(points_of(study, str(scene_of(study, path))), _STEPS))
 
 
-def _robots() -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in sorted((scene_folder() / "robots").glob("*.urdf"))}
-
-
 def _read_robot(path: Path) -> None:
     read_urdf(path)
     read_collisions(path)
-
-
-def _read_problem(path: Path) -> None:
-    read_problem(path)
 
 
 def _read_results(path: Path) -> None:
@@ -143,13 +127,6 @@ def _read_results(path: Path) -> None:
             inspect(path, 3)
     except RunFileError:
         read_table(path, "sample")
-
-
-def _only_text_or_bytes(sample: bytes, other: bytes, rng: Rng) -> bytes:
-    """Texts as texts; what is compressed, as bytes."""
-    if sample[:2] == b"\x1f\x8b":
-        return damaged_bytes(sample, rng)
-    return damaged_text(sample.decode(), rng, "" if other[:2] == b"\x1f\x8b" else other.decode())
 
 
 _LCP = "2\n2 1\n1 2\n-5 -6\n"
@@ -199,10 +176,10 @@ def _write_global(path: Path, rng: Rng) -> None:
 def result_files() -> dict[str, bytes]:
     """A short run, and a table."""
     with tempfile.TemporaryDirectory() as folder:
-        run = open_store(folder_path := Path(folder)).put(inputs_of(0), sample_run(), "sample")
-        columns = (Column("x", np.arange(4.0), "m", "where"), Column("word", tuple("abcd"), "1", "what"))
-        write_table(folder_path / "table.h5", Table("sample", columns))
-        return {"run.h5": run.read_bytes(), "table.h5": (folder_path / "table.h5").read_bytes()}
+        run, table = put(Path(folder)), Path(folder) / "table.h5"
+        write_table(table, "sample", titled(("x [m]", "word"), [(0.5, "a"), (1.5, "b")]))
+        return {"run.h5": run.read_bytes(), "table.h5": table.read_bytes()}
+
 
 
 def damaged_hdf5(sample: bytes, other: bytes, rng: Rng) -> bytes:
@@ -220,21 +197,20 @@ def _changed(content: bytes, rng: Rng) -> bytes:
     with h5py.File(stream, "r+") as file:
         names: list[str] = []
         file.visit(names.append)
-        for _ in range(int(rng.integers(1, 4))):
-            name = names[int(rng.integers(len(names)))]
-            if name in file:
+        for _ in changes(rng):
+            if (name := chosen(rng, names)) in file:
                 _change(file, name, rng)
     return stream.getvalue()
 
 
 def _change(file: Any, name: str, rng: Rng) -> None:
-    kind, wrong = int(rng.integers(5)), _WRONG[int(rng.integers(len(_WRONG)))]
+    kind, wrong = int(rng.integers(5)), chosen(rng, _WRONG)
     owner = file[name] if rng.random() < 0.5 else file
     if kind == 0 and len(owner.attrs):
-        attribute = sorted(owner.attrs)[int(rng.integers(len(owner.attrs)))]
-        if rng.random() < 0.5:
+        attribute = chosen(rng, sorted(owner.attrs))
+        if rng.random() < 0.5 or not isinstance(wrong, np.ndarray):
             del owner.attrs[attribute]
-        elif isinstance(wrong, np.ndarray) and wrong.size < 100:
+        else:
             owner.attrs[attribute] = wrong
         return
     if kind == 1:
@@ -257,86 +233,71 @@ _WRONG: tuple[Any, ...] = (
 )  # fmt: skip
 
 
-_PART, _PARTS = 60, 4  # steps of a chunk of the logs, and how many there are
+_CHUNK, _CHUNKS = 60, 4  # steps of a part of a killed run, and how many parts there are
+_KEY, _GO_ON = "fuzz", "run"
 
 
 @cache
-def _logged() -> tuple[dict[str, bytes], list[str], str]:
-    """The logs of a run, to read and to go on from, and of a live run; what first chunks, and what all, come to."""
+def _killed() -> tuple[dict[str, bytes], list[str], str]:
+    """Parts of a run, to read and to go on from, and of a live run; what the first ones, and what all, come to."""
     hashes: list[str] = []
-    scene = load_scene(find_scene("peg_corner"))
     with tempfile.TemporaryDirectory() as folder:
-        simulation = _simulation(scene)
-        recorder, total = Recorder(simulation), _PART * _PARTS
-        logs = (RunLog(Path(folder) / "run.h5.log", log_head(simulation, "IAPB", total, key=_KEY, code=_KEY)),
-                open_log(Path(folder), "live", simulation, "IAPB", total))  # fmt: skip
-        for _ in range(_PARTS):
-            recorder.chunk(recorder.steps + _PART)
+        simulation = _simulation()
+        recorder, total = Recorder(simulation), _CHUNK * _CHUNKS
+        head = parts_head(simulation, "IAPB", total, key=_KEY, code=_KEY)
+        writers = (Parts(Path(folder) / "run.h5.parts", head),
+                   open_parts(Path(folder), "live", simulation, "IAPB", total))  # fmt: skip
+        for _ in range(_CHUNKS):
+            recorder.chunk(recorder.steps + _CHUNK)
             hashes.append(content_hash(recorder.run("IAPB", "killed")))
-            for log, more in zip(logs, ((), (np.zeros((_PART, TICK_COLUMNS)),)), strict=True):
-                log.write_chunk(recorder.records[-1], _PART, 0.0, more)
-                log.write_state(simulation.arrays())
-        for log in logs:
-            log.close()
-        run, live = (log.path.read_bytes() for log in logs)
-        return {"read.h5.log": run, _GO_ON: run, "live.h5.log": live}, hashes, content_hash(recorder.run("IAPB", ""))
+            for parts, more in zip(writers, (None, np.zeros((_CHUNK, TICK_COLUMNS))), strict=True):
+                parts.write(recorder.records[-1], _CHUNK, 0.0, more, simulation.arrays())
+        run, live = (json.dumps([path.read_bytes().hex() for path in sorted(parts.folder.glob("*.part"))]).encode()
+                     for parts in writers)  # fmt: skip
+        for parts in writers:
+            parts.close()
+        return {"read": run, _GO_ON: run, "live": live}, hashes, content_hash(recorder.run("IAPB", ""))
 
 
-_KEY, _GO_ON = "fuzz", "run.h5.log"
-
-
-def _simulation(scene: Scene) -> Simulation:
-    world = find_world("IAPB")
+def _simulation() -> Simulation:
+    world, scene = find_world("IAPB"), load_scene(find_scene("peg_corner"))
     return Simulation(scene, world.law, world.coupling_in(scene))
 
 
-def damaged_log(sample: bytes, other: bytes, rng: Rng) -> bytes:
-    """Damage to the first line, to the lines of blocks, anywhere; or whole blocks lost, doubled or put elsewhere."""
-    pieces, kind = _blocks(sample), rng.random()
-    if kind < 0.35:
-        return damaged_bytes(pieces[0], rng) + b"".join(pieces[1:])
-    if kind < 0.6:
-        at = int(rng.integers(1, len(pieces)))
-        line, _, numbers = pieces[at].partition(b"\n")
-        pieces[at] = damaged_bytes(line, rng) + b"\n" + numbers
-        return b"".join(pieces)
-    if kind < 0.8:
-        return damaged_bytes(sample, rng)
+def damaged_parts(sample: bytes, other: bytes, rng: Rng) -> bytes:
+    """Damage to the bytes of a part, more often to the first; or whole parts lost, doubled or put elsewhere."""
+    pieces = [bytes.fromhex(text) for text in json.loads(sample)]
     at, to = (int(rng.integers(1, len(pieces))) for _ in range(2))
-    taken = (pieces if rng.random() < 0.7 else _blocks(other))[at]
-    if rng.random() < 0.5:
-        del pieces[to]
-    return b"".join([*pieces[:to], taken, *pieces[to:]])
-
-
-@cache
-def _places(log: bytes) -> tuple[int, ...]:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "log"
-        path.write_bytes(log)
-        return (0, *(block.start for block in read_log(path)[1]), len(log))
-
-
-def _blocks(log: bytes) -> list[bytes]:
-    """The first line of a log, and each of its blocks."""
-    return [log[start:end] for start, end in pairwise(_places(log))]
+    if rng.random() < 0.75:
+        at = 0 if rng.random() < 0.4 else at
+        line, newline, numbers = pieces[at].partition(b"\n")
+        whole = rng.random() < 0.5
+        pieces[at] = damaged_bytes(pieces[at], rng) if whole else damaged_bytes(line, rng) + newline + numbers
+    elif rng.random() < 0.5:
+        pieces[at] = bytes.fromhex(json.loads(other)[to])
+    else:
+        pieces.insert(to, pieces.pop(at))
+    return json.dumps([piece.hex() for piece in pieces]).encode()
 
 
 class WrongContent(Exception):
-    """Something else came of a damaged log than of the whole one."""
+    """Something else came of damaged parts than of the whole ones."""
 
 
-def _read_log(path: Path) -> None:
+def _read_parts(path: Path) -> None:
     """Go on to the end of a run; of a live run, and of another, make readable what there is."""
-    _, parts, whole = _logged()
-    target = path.with_suffix("")
+    _, of_first, whole = _killed()
+    parts, target = path.with_name(f"{path.name}.h5.parts"), path.with_name(f"{path.name}.h5")
+    shutil.rmtree(parts, ignore_errors=True)
     target.unlink(missing_ok=True)
+    parts.mkdir()
+    for number, text in enumerate(json.loads(path.read_bytes())):
+        (parts / f"{number:08d}.part").write_bytes(bytes.fromhex(text))
     if path.name == _GO_ON:
-        simulation = _simulation(load_scene(find_scene("peg_corner")))
-        stream(Place(_KEY, target), simulation, "IAPB", _PART * _PARTS, resume=True)
+        Stream(Place(_KEY, target), _simulation(), "IAPB", _CHUNK * _CHUNKS).run(resume=True)
         if read_entry(target).content_hash != whole:
             raise WrongContent("the run that went on is another one")
-    elif read_entry(finish_live(path, "killed")[0] if is_live(path) else recover(path)).content_hash not in parts:
+    elif read_entry(finish_live(parts, "killed")[0] if is_live(parts) else recover(parts)).content_hash not in of_first:
         raise WrongContent("the steps are others than were recorded")
 
 
@@ -356,9 +317,6 @@ _WORDS = (
     "walls=[]", "bodies=[]", "couplings=~", "hand=", "bodies.9.mass=1", "contact..x=1", "name=..", "-1", "--impacts",
     "run.h5", "table.h5", "results", "", "contact.friction=0.3", "check", "gc",
 )  # fmt: skip
-_ENDS = (0, 1, 2)
-
-
 class LineError(Exception):
     """A command line ended in a way that none may: another status, no message, a traceback in the text."""
 
@@ -372,19 +330,11 @@ def damaged_line(sample: bytes, other: bytes, rng: Rng) -> bytes:
     """Return a line with words changed, as JSON."""
     words = json.loads(sample)
     for _ in range(int(rng.choice([1, 1, 1, 2, 3]))):
-        at = int(rng.integers(len(words) + 1))
-        pool = _WORDS if rng.random() < 0.7 else TOKENS
-        known, kind = pool[int(rng.integers(len(pool)))], int(rng.integers(5))
-        if kind == 0:
-            words.insert(at, known)
-        elif kind == 1 and at < len(words):
-            words[at] = known
-        elif kind == 2:
-            words = words[:at] + words[at + 1 :]
-        elif kind == 3 and at < len(words):
-            words[at] = words[at][: int(rng.integers(1 + len(words[at])))] + known
-        else:
-            words += json.loads(other)[1:]
+        at, known = int(rng.integers(len(words) + 1)), str(chosen(rng, _WORDS if rng.random() < 0.7 else TOKENS))
+        cut = words[at][: int(rng.integers(1 + len(words[at])))] if at < len(words) else ""
+        after = words[at + 1 :]
+        words = words[:at] + chosen(rng, [[known, *words[at:]], [known, *after], after, [cut + known, *after],
+                                          [*words[at:], *json.loads(other)[1:]]])  # fmt: skip
     return json.dumps(words).encode()
 
 
@@ -398,47 +348,32 @@ def run_line(path: Path) -> None:
     LineError
         Where it ended in another way.
     """
-    words = _without_long_work(json.loads(path.read_bytes()))
-    status, said, complained = _called(words, path.parent)
-    if status not in _ENDS or "Traceback" in complained:
-        raise LineError(f"{words}: ended with {status}: {complained}")
-    if status and not (complained.strip() or said.strip()):
-        raise LineError(f"{words}: ended with {status} and said nothing")
-    if status:
-        raise IapbError(complained.strip())
-
-
-def _without_long_work(words: list[str]) -> list[str]:
-    """A line that might start long work gets an option that no command has."""
-    words = [word for word in words if word != _DEBUG]
-    return [*words, "--no-such-option"] if set(words) & set(_LONG) else words
-
-
-def _called(words: list[str], folder: Path) -> tuple[int, str, str]:
-    for place in (folder, folder / "results"):
+    words = [word for word in json.loads(path.read_bytes()) if word != _DEBUG]
+    words += ["--no-such-option"] if set(words) & set(_LONG) else []  # what might start long work
+    for place in (path.parent, path.parent / "results"):
         place.mkdir(exist_ok=True)
         for name, content in result_files().items():
-            if not (place / name).exists():
-                (place / name).write_bytes(content)
+            (place / name).write_bytes(content)
     out, error, before = io.StringIO(), io.StringIO(), Path.cwd()
-    os.chdir(folder)
+    os.chdir(path.parent)
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
             status = main(words)
     finally:
         os.chdir(before)
-    return status, out.getvalue(), error.getvalue()
-
-
+    said, complained = out.getvalue().strip(), error.getvalue().strip()
+    if status not in (0, 1, 2) or "Traceback" in complained or (status and not (said or complained)):
+        raise LineError(f"{words}: ended with {status}: {complained}")
+    if status:
+        raise IapbError(complained)
 KINDS = {kind.name: kind for kind in (
-    Kind("scenes in the plane", _planar, _scene_or_text, _read_scene),
-    Kind("scenes in space", _spatial, _scene_or_text, _read_scene),
-    Kind("URDF robots", _robots, _text_or_bytes, _read_robot, 1.5),
-    Kind("sweep studies", _studies, _scene_or_text, _read_study, 1.5),
-    Kind("LCP and MLCP files", problem_texts, _only_text_or_bytes, _read_problem, 1.25),
-    Kind("FCLIB files", fclib_files, damaged_hdf5, _read_problem),
-    Kind("run files and tables", result_files, _only_bytes, _read_results, 1.25),
+    Kind("scenes", _shipped("*.yaml"), _as_values, _read_scene, 2.0),
+    Kind("URDF robots", _shipped("robots/*.urdf"), _as_text, _read_robot, 1.5),
+    Kind("sweep studies", _shipped("sweeps/*.yaml"), _as_values, _read_study, 1.5),
+    Kind("LCP and MLCP files", problem_texts, _as_text, read_problem, 1.25),
+    Kind("FCLIB files", fclib_files, damaged_hdf5, read_problem),
+    Kind("run files and tables", result_files, _as_bytes, _read_results, 1.25),
     Kind("sealed run files", result_files, damaged_hdf5_sealed, _read_results, 0.6),
-    Kind("logs of killed runs", lambda: _logged()[0], damaged_log, _read_log, 0.4),
+    Kind("parts of killed runs", lambda: _killed()[0], damaged_parts, _read_parts, 0.4),
     Kind("command lines", lines, damaged_line, run_line, 0.5),
 )}  # fmt: skip

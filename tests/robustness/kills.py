@@ -1,11 +1,9 @@
-"""Commands killed while they write, in a tree of other people's files: `KILLS` by name, each `fault(folder, times)`.
+"""Commands killed while they write, in a tree of other people's files: `killed_command(name, folder, times)`.
 
-Part of `python -m tests.robustness.faults`. A kill is survived if no result is damaged, no finished one is gone, and
-the hash of the foreign tree is as before. The same command goes on in what the kill left, and is killed again; what it
-comes to in the end has the content of a run that nobody disturbed. A kill counts where the command was still running.
-
-The commands start in a process that has imported iapb and loaded its kernels, and runs go to their log early and often:
-a kill meets their writing, not imports.
+A kill is survived if no result is damaged, no finished one is gone, and the hash of the foreign tree is as before. The
+same command goes on in what the kill left, and is killed again; what it comes to in the end has the content of a run
+that nobody disturbed. A kill counts where the command was still running. The commands start in a process that has
+imported iapb and loaded its kernels, and runs write parts early and often: a kill meets their writing, not imports.
 """
 
 from __future__ import annotations
@@ -16,9 +14,8 @@ import re
 import shutil
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from functools import partial
 from math import inf
 from multiprocessing import get_context
 from pathlib import Path
@@ -43,7 +40,8 @@ grid:
   contact.friction: [0.0, 0.2, 0.4]
 """
 FOREIGN = ("thesis.h5", "big.iso.partial", "notes.txt", "mine-0123456789abcdef.h5", ".x.h5.1.writing",
-           f"{OWN}/thesis.h5", f"{OWN}/log.h5.log", f"{OWN}/y.h5.2.writing", f"{OWN}/z.h5.partial")  # fmt: skip
+           f"{OWN}/thesis.h5", f"{OWN}/run.h5.parts/00000001.part", f"{OWN}/y.h5.2.writing",
+           f"{OWN}/z.h5.partial")  # fmt: skip
 COMMANDS: dict[str, Sequence[str]] = {
     "run": ("run", "peg_corner", "--set", "duration=60", "--resume", "--out", OWN),
     "live": ("live", "peg_corner", "--seconds", "0.7", "--out", OWN),
@@ -54,29 +52,34 @@ COMMANDS: dict[str, Sequence[str]] = {
 }
 _OLDER, _LEFT, _STALE = 3, 1500, "stale-"  # files that gc finds: runs of older code, and what killed writers left
 _LIVE = re.compile(r"peg_corner-\d{8}T\d+\.h5")
-_POLL_SECONDS = 1e-3
 _MOST_ATTEMPTS = 5  # per kill that counts
 
 
 def killed_command(name: str, folder: Path, times: int, seconds: float = inf) -> tuple[int, int, int, str]:
     """Start a command, kill it at some moment after it first changed its folder, start it again in what is left.
 
-    `seconds` : after which no more kills are tried.
+    Return tried, survived, lost, and what happened. After `seconds`, no more kills are tried.
     """
-    _make_foreign(folder)
+    make_foreign(folder)
     garbage = _garbage_and_a_run(folder) if name == "store gc" else b""
-    kept = set((folder / OWN).iterdir())
-    before, rng, count, survived, lost, making = foreign_hash(folder), np.random.default_rng(0), 0, 0, 0, 0
-    rest = _undisturbed(name, folder, garbage)
-    contents, until = _contents(folder), time.monotonic() + seconds
+    kept, before = set((folder / OWN).iterdir()), foreign_hash(folder)
+    _plant(folder, garbage)
+    assert _call(COMMANDS[name], folder) == 0, f"iapb {name} does not run"
+    contents = _contents(folder)
     _clear(folder, kept)
+    _plant(folder, garbage)
+    child, began = _started(name, folder), time.monotonic()
+    child.join()
+    rest = time.monotonic() - began  # of an undisturbed command, after its first change
+    _clear(folder, kept)
+    rng, until = np.random.default_rng(0), time.monotonic() + seconds
+    count = survived = lost = making = 0
     for _ in range(_MOST_ATTEMPTS * times):
         if count == times or time.monotonic() > until:
             break
         _plant(folder, garbage)
         finished = _finished(folder)
-        child = _start(name, folder)
-        _changed(folder, child)
+        child = _started(name, folder)
         child.join(float(rng.uniform(0.0, rest)))
         if child.exitcode is None:
             os.killpg(child.pid, signal.SIGKILL)
@@ -91,27 +94,10 @@ def killed_command(name: str, folder: Path, times: int, seconds: float = inf) ->
         count, lost = count + 1, lost + gone
         left = sum(state.state in (LEFTOVER, PARTIAL) or state.path.name.startswith(_STALE) for state in states)
         making += 0 < left < _OLDER + _LEFT if garbage else left > 0
-        damaged = any(state.state == DAMAGED for state in states)
-        survived += gone == 0 and not damaged and foreign_hash(folder) == before
+        survived += not gone and foreign_hash(folder) == before and all(state.state != DAMAGED for state in states)
     ended = _call(COMMANDS[name], folder) == 0 and _contents(folder) == contents
     repaired = _call(("store", "repair", OWN), folder) == 0 and foreign_hash(folder) == before
-    met = "the middle of its work" if garbage else "a file in the making"
-    said = f"nothing: the next one goes on; {making} of {count} met {met}"
-    return count, survived if ended and repaired else 0, lost, said
-
-
-def _undisturbed(name: str, folder: Path, garbage: bytes) -> float:
-    """Do a command here, so that all is loaded, and in a child; return how long that takes after its first change."""
-    kept = set((folder / OWN).iterdir())
-    _plant(folder, garbage)
-    assert _call(COMMANDS[name], folder) == 0, f"iapb {name} does not run"
-    _clear(folder, kept)
-    _plant(folder, garbage)
-    child = _start(name, folder)
-    _changed(folder, child)
-    began = time.monotonic()
-    child.join()
-    return time.monotonic() - began
+    return count, survived if ended and repaired else 0, lost, f"{making} of {count} met files in the making"
 
 
 def _call(words: Sequence[str], folder: Path) -> int:
@@ -124,10 +110,14 @@ def _call(words: Sequence[str], folder: Path) -> int:
         os.chdir(before)
 
 
-def _start(name: str, folder: Path) -> Any:
-    process = get_context("fork").Process(target=_child, args=(name, folder))
-    process.start()
-    return process
+def _started(name: str, folder: Path) -> Any:
+    """Start a command in a process of its own; return it after its first change of the folder, or at its end."""
+    before = _listing(folder)
+    child = get_context("fork").Process(target=_child, args=(name, folder))
+    child.start()
+    while child.exitcode is None and _listing(folder) == before:
+        time.sleep(1e-3)
+    return child
 
 
 def _child(name: str, folder: Path) -> None:
@@ -136,18 +126,12 @@ def _child(name: str, folder: Path) -> None:
     os._exit(_call(COMMANDS[name], folder))
 
 
-def _changed(folder: Path, child: Any) -> None:
-    """Wait until something changes in the command's folder, or the command ends."""
-    before = _listing(folder)
-    while child.exitcode is None and _listing(folder) == before:
-        time.sleep(_POLL_SECONDS)
-
-
 def _listing(folder: Path) -> set[str]:
     return {f"{place}/{name}" for place, _, names in os.walk(folder / OWN) for name in names}
 
 
-def _make_foreign(folder: Path) -> None:
+def make_foreign(folder: Path) -> None:
+    """Put other people's files, links and a study into a folder, and mark its subfolder as a store."""
     rng = np.random.default_rng(0)
     for name in FOREIGN:
         path = folder / name
@@ -203,9 +187,3 @@ def _contents(folder: Path) -> dict[str, str]:
     """Content hash of each finished run; live ones have the time in their name, and are never the same."""
     return {path.name: read_entry(path).content_hash for path in _finished(folder)
             if is_run(path) and not _LIVE.fullmatch(path.name)}  # fmt: skip
-
-
-# name -> (folder, times) -> tried, survived, lost, said
-KILLS: dict[str, Callable[..., tuple[int, int, int, str]]] = {
-    f"kill -9 of iapb {name}": partial(killed_command, name) for name in COMMANDS
-}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,10 +15,9 @@ import h5py
 import numpy as np
 import pytest
 
-from iapb.errors import IapbError
 from reference.datasets import DatasetError, read_problem
 from reports.cli import Harmless, harmless, main
-from reports.store import read_run, write_run
+from reports.store import write_run
 from reports.store.io import sealed
 from tests.robustness.faults import sample_run
 from tests.robustness.inputs import fclib_files
@@ -123,17 +123,9 @@ def test_no_text_of_a_file_gives_the_terminal_orders(tmp_path: Path, capsys: pyt
     assert "\\x1b]0;owned\\x07" in said
 
 
-class Terminal(io.StringIO):
-    """A stream that says it is a terminal."""
-
-    def isatty(self) -> bool:
-        return True
-
-
 def test_a_terminal_gets_colours_and_nothing_else_that_it_obeys() -> None:
-    import re
-
-    stream = Terminal()
+    stream = io.StringIO()
+    stream.isatty = lambda: True  # type: ignore[method-assign]
     Harmless(stream, re.compile(r"(\x1b\[[0-9;]*m)")).write(f"\x1b[1;31mred\x1b[0m\n{ORDERS}")
     assert stream.getvalue() == f"\x1b[1;31mred\x1b[0m\n{harmless(ORDERS)}"
     assert harmless("tab\tand\nend") == "tab\tand\nend"
@@ -145,9 +137,3 @@ def test_without_a_folder_for_the_cache_kernels_are_compiled_in_memory_and_it_is
                "a = np.zeros(3); copy_into(a, np.ones(3)); print(a.sum())")  # fmt: skip
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "3.0" and done.stderr.count("UserWarning: kernels are compiled anew") == 1
-
-
-def test_what_is_no_file_and_no_folder_is_refused_by_the_store(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(IapbError, match="no regular file"):
-        read_run(tmp_path / "pipe")

@@ -47,7 +47,7 @@ def check_claims(
     depth : "quick" (about a minute) or "full"
     ids : the claims to check; default all
     progress : called as progress(number of claims done, number of claims, id of the next claim)
-    options : `asked` and `ahead`, as in `Study`
+    options : `asked`, as in `Study`
 
     Raises
     ------

@@ -18,7 +18,7 @@ from reference.exact import bulk_energy_gain, exact_impact, rational_matrix
 from reference.worlds import run_world
 from verification.check import Check, Study
 from verification.claims.conditions import START, Condition, start_conditions
-from verification.claims.peg import place, trace, traces_ahead
+from verification.claims.peg import place, trace
 from verification.impacts import Family, Floats, ImpactCase, approaching, draw_of_rank, whole_numbers
 from verification.methods import gram_cholesky, gram_pinv
 from verification.proofs.cases import pseudo_inverse
@@ -234,15 +234,10 @@ def _differing(velocities: Callable[[ImpactCase, Fraction], tuple[Any, Any]]) ->
 
 def _by_pseudo_inverse(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
     """Return v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v, the printed formula (21), and v⁺ from independent rows."""
-    mass, rows, v = (rational_matrix("impact", array) for array in case.arrays)
-    closing = pseudo_inverse(rows * mass.solve(rows.transpose())) * (rows * v)
-    change = mass.solve(rows.transpose() * closing).entries()
-    after = (_fraction(a) - (1 + e) * _fraction(b) for a, b in zip(v.entries(), change, strict=True))
-    return after, exact_impact(*case.arrays, e).velocity
-
-
-def _fraction(x: Any) -> Fraction:
-    return Fraction(int(x.p), int(x.q))
+    mass, rows, v, factor = (rational_matrix("impact", array) for array in (*case.arrays, np.array([1 + e])))
+    impulse = pseudo_inverse(rows * mass.solve(rows.transpose())) * (rows * v) * factor
+    after = v - mass.solve(rows.transpose() * impulse)
+    return [Fraction(str(x)) for x in after.entries()], exact_impact(*case.arrays, e).velocity
 
 
 def _reversed_rows(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
@@ -403,7 +398,6 @@ def _random_or_peg(study: Study, case: tuple[Any, ...]) -> Any:
     if len(case) > 1:
         return _PASSIVE.row(study, case)
     starts, rendering = start_conditions(study.depth), RENDERED[case[0]]
-    traces_ahead(study, starts, [("IAPB", rendering)])
     traces = list(study.each(starts, lambda start: [trace(study, start, "IAPB", rendering)]))
     return {"part": case[0], "coordinates": 3, "restitution": 0.0,
             "impacts": sum(len(one.impact_step) for one in traces),

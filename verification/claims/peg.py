@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -63,22 +63,10 @@ def trace(study: Study, condition: Condition, world: str, rendering: str = "full
     return study.once((seen, world, rendering), lambda: trace_of(study.run(*wanted)))
 
 
-def traces_ahead(study: Study, conditions: Iterable[Condition], runs: Iterable[tuple[str, str]]) -> None:
-    """Make the missing runs (world, rendering) of these conditions with `ahead`; without `ahead` do nothing."""
-    if study.ahead is None:
-        return
-    wanted = ((condition.seen_by(*run), *run) for condition in conditions for run in runs)
-    missing = [key for key in dict.fromkeys(wanted) if key not in study.results]
-    found = study.ahead([(place(study, seen), world, rendering) for seen, world, rendering in missing])
-    study.results |= {key: trace_of(run) for key, run in zip(missing, found, strict=True) if run is not None}
-
-
-def peg_claim(
-    key: str, question: str, runs: Sequence[tuple[str, str]], *, limited: bool = False, **words: Any
-) -> Check:
+def peg_claim(key: str, question: str, *, limited: bool = False, **words: Any) -> Check:
     """Return a claim on every start of the peg, with device limits or without; `words` are other fields of Check.
 
-    runs : (world, rendering) of the runs that a row uses. To confirm a region, FRESH starts are drawn inside it.
+    To confirm a region, FRESH starts are drawn inside it.
     """
 
     def cases(study: Study) -> tuple[Condition, ...]:
@@ -87,8 +75,7 @@ def peg_claim(
     def draw(study: Study, region: Region) -> list[Condition]:
         return drawn(cases(study), region, study.seed, FRESH)
 
-    common: dict[str, Any] = {"cases": cases, "draw": draw, "conditions": tuple(UNITS),
-                              "prepare": lambda study, starts: traces_ahead(study, starts, runs)}  # fmt: skip
+    common: dict[str, Any] = {"cases": cases, "draw": draw, "conditions": tuple(UNITS)}
     return Check(key=key, question=question, **common | words)
 
 
@@ -163,7 +150,7 @@ def _trajectory_says(table: Table) -> str:
 
 C10 = peg_claim(
     "C10", "The device trajectory of IAPB is closest to ideal, ahead of PB and CBuc.",
-    (("ideal", "full"), ("IAPB", "full"), ("PB", "full"), ("CBuc", "full")), place="Section VI, Fig. 7",
+    place="Section VI, Fig. 7",
     quantity="RMS distance of the device trajectory from that of the ideal world, per coordinate, from the first "
     "contact until all four worlds have settled or the run ends. The table also has the largest distance. A contact "
     "collides if it approaches faster than the approach velocity; 1e-6 m/s takes every approaching contact, as the "
@@ -220,7 +207,7 @@ def _forces_say(table: Table) -> str:
 
 C11 = peg_claim(
     "C11", "Forces are large on new contact, only balance the hand while in contact, and are closest to ideal.",
-    (("ideal", "full"), ("IAPB", "full"), ("PB", "full"), ("CBuc", "full")), place="Section VI, Fig. 8",
+    place="Section VI, Fig. 8",
     quantity="Peak force of the device's actuators; their mean force after settling; RMS distance to ideal of the "
     "force's time integral. The integral is compared because a spike that comes one step later is a small difference.",
     tolerance="Peak: larger than PB's. Mean force: within 0.05 N of the hand force, which is the damper's force at the "
@@ -266,7 +253,7 @@ def _lost_says(table: Table) -> str:
 
 C12 = peg_claim(
     "C12", "Saturating the impulses at the device loses most performance, spreading them over steps loses least.",
-    [("IAPB", rendering) for rendering in ("full", *RENDERINGS)], limited=True, place="Section VI, Fig. 9",
+    limited=True, place="Section VI, Fig. 9",
     quantity="RMS distance of the device trajectory from that of a device without limits, per coordinate.",
     tolerance="Saturating: strictly the largest distance of the three. Spreading: strictly the smallest. A trial "
     "cannot tell if no impulse reaches the limit or all three are within 1e-7 of the unlimited device.",
@@ -299,8 +286,7 @@ def _limited_trajectory_says(table: Table) -> str:
 
 C13 = peg_claim(
     "C13", "With device limits, IAPB stays closest to ideal and penetrates less than PB.",
-    (("ideal", "full"), ("IAPB", "spread"), ("PB", "full"), ("CBuc", "full")), limited=True,
-    place="Section VI, Fig. 10",
+    limited=True, place="Section VI, Fig. 10",
     quantity="As C10, with the impulses spread over steps at 1 and 0.3 times the paper's limits; deepest overlap of "
     "tool and walls.",
     tolerance="IAPB's value is strictly the smallest. A trial cannot tell if all three are within 1e-7 of ideal.",
@@ -343,7 +329,7 @@ def _limited_forces_say(table: Table) -> str:
 
 C14 = peg_claim(
     "C14", "Impulses kept within the device's limits still exceed the penalty forces felt on contact.",
-    (("IAPB", "spread"), ("PB", "full")), limited=True, place="Section VI, Fig. 11",
+    limited=True, place="Section VI, Fig. 11",
     quantity="Peak force of the device's actuators over the run, per coordinate, IAPB spread against PB.",
     tolerance="IAPB's peak is strictly larger. A coordinate does not count if neither peak reaches a hundredth of the "
     "smallest force that can be felt.",
@@ -399,7 +385,6 @@ def _settling_says(table: Table) -> str:
 
 C15 = peg_claim(
     "C15", "At 512 Hz the peg bounces less and settles sooner than with PB, with or without device limits.",
-    (("IAPB", "full"), ("IAPB", "spread"), ("PB", "full")),
     place="Section VII, Fig. 12 and 13 (an experiment there; an emulated device here)",
     quantity="How often a corner of the device's peg leaves a wall by more than 10 µm after touching it; time from "
     "the first contact until the device stays below 1 mm/s and 0.01 rad/s.",
@@ -442,7 +427,7 @@ def _separation_says(table: Table) -> str:
 
 C16 = peg_claim(
     "C16", "Scaling and spreading keep tool and device together on impact; saturating does not.",
-    [("IAPB", rendering) for rendering in RENDERINGS], limited=True, place="Section VI",
+    limited=True, place="Section VI",
     quantity="Largest difference of tool and device over the run, in position and angle.",
     tolerance="Together: at most 1e-9 m and rad, the rounding over 1536 steps. Apart: more than 1e-6 m or rad.",
     row=_separation, holds=_separation_holds, says=_separation_says, parts=("rendering",),

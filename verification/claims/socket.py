@@ -65,11 +65,8 @@ def _row(study: Study, case: Socket) -> dict[str, Any]:
 def _found(study: Study, case: Socket) -> FalseCollisions:
     distances = {"cluster_distance": 1e-3 * case.cluster, "coherence_distance": 1e-3 * case.coherence}
 
-    def count() -> FalseCollisions:
-        scene = socket(distances | {"damping": case.damping}, case.rate)
-        return count_false(scene, lambda scene: study.run(scene, "IAPB", "full"))
-
-    return study.once(("socket", case), count)
+    return study.once(("socket", case), lambda: count_false(
+        study.run(socket(distances | {"damping": case.damping}, case.rate), "IAPB", "full")))
 
 
 def _holds(row: Row) -> bool | None:

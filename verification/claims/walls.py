@@ -10,14 +10,15 @@ import numpy as np
 
 from verification.check import Check, Study
 from verification.claims.conditions import DAMPINGS, STIFFNESSES, Condition
-from verification.claims.peg import trace, traces_ahead
+from verification.claims.peg import trace
 from verification.laws.engine import leak, penalty_wall, quickest_motion
 from verification.region import Region
 from verification.scenes.measures import Trace
 from verification.stability.walls import (
     PAPER_DAMPING,
     PENALTY,
-    StabilityMap,
+    Floats,
+    Loop,
     grid,
     loops,
     maps_of,
@@ -88,7 +89,6 @@ C17 = Check(
     "loss that does not depend on the walls is the same as well.",
     cases=lambda study: [Condition(tilt, stiffness=stiffness, damping=damping) for tilt in (0.0, 0.1)
                          for stiffness in STIFFNESSES for damping in DAMPINGS],
-    prepare=lambda study, cases: traces_ahead(study, cases, [("IAPB", "full"), ("PB", "full")]),
     row=_losses, holds=_loss_holds, says=_losses_say, parts=["part"], conditions=["tilt", "stiffness", "damping"],
     axes=("stiffness", "damping", "part"),
 )  # fmt: skip
@@ -157,42 +157,34 @@ SAME_DAMPING, EQUAL_GAIN, BEST = RIVALS = (
     "penalties, same damping", "penalties, damping with the impulse's force", "penalties, best larger damping"
 )  # fmt: skip
 FRESH = 5  # number of walls per loop drawn to confirm a region
-Maps = tuple[StabilityMap, StabilityMap]  # of one loop: with penalties, and with impulses
+Case = tuple[Loop, Floats]  # and the stiffnesses of its walls
 
 
-def _maps(study: Study) -> list[Maps]:
-    return [maps_of(loop, *grid(study.depth)) for loop in loops()]
-
-
-def _fresh_maps(study: Study, region: Region) -> list[Maps]:
+def _draw(study: Study, region: Region) -> Iterator[Case]:
     """Draw fresh walls inside a region for every loop, uniformly in the logarithm of the stiffness."""
-    stiffness, damping = grid(study.depth)
-    low, high = region.ends("stiffness", stiffness.tolist())
-    rng, found = np.random.default_rng(study.seed), []
+    low, high = region.ends("stiffness", grid(study.depth)[0].tolist())
+    rng = np.random.default_rng(study.seed)
     for loop in loops():
-        fresh = np.array([float(f"{low * (high / low) ** share:.4g}") for share in rng.random(FRESH)])
-        found.append(maps_of(loop, fresh, damping))
-    return found
+        yield loop, np.array([float(f"{low * (high / low) ** share:.4g}") for share in rng.random(FRESH)])
 
 
-def _settling(study: Study, case: Maps) -> Iterator[Row]:
+def _settling(study: Study, case: Case) -> Iterator[Row]:
     """Yield the rows of the walls of one loop: impulses at the paper's damping against three penalties."""
-    penalty, impulses = case
-    loop, raised = penalty.loop, penalty.damping[penalty.damping >= PAPER_DAMPING]
-    times = np.array([penalty.settling(damping) for damping in raised])
-    best, ours = times.argmin(axis=0), impulses.settling(PAPER_DAMPING)
+    (loop, stiffness), dampings = case, grid(study.depth)[1]
+    raised = dampings[dampings >= PAPER_DAMPING]
+    penalty, impulses = (one.settles_after[dampings >= PAPER_DAMPING] for one in maps_of(loop, stiffness, dampings))
+    best = penalty.argmin(axis=0)
     # the damping whose force at first contact equals the impulse's
     gain = (1.0 + loop.restitution) * loop.mass / loop.step
-    contact = touch_walls(loop, penalty.stiffness, np.full_like(penalty.stiffness, gain), PENALTY)
-    sustained = np.where(contact.settled, contact.settling_time, np.inf)
-    for i, K in enumerate(penalty.stiffness):
-        rivals = {SAME_DAMPING: (times[0, i], PAPER_DAMPING), EQUAL_GAIN: (sustained[i], gain),
-                  BEST: (times[best[i], i], raised[best[i]])}  # fmt: skip
+    sustained = touch_walls(loop, stiffness, np.array(gain), PENALTY).settles_after
+    for i, K in enumerate(stiffness):
+        rivals = {SAME_DAMPING: (penalty[0, i], PAPER_DAMPING), EQUAL_GAIN: (sustained[i], gain),
+                  BEST: (penalty[best[i], i], raised[best[i]])}  # fmt: skip
         for against, (theirs, damping) in rivals.items():
             yield {
                 "against": against, "rate [Hz]": loop.rate, "delay [samples]": loop.delay,
                 "device damping [N s/m]": loop.device_damping, "stiffness [N/m]": float(K),
-                "impulses settle after [s]": float(ours[i]), "penalty settles after [s]": float(theirs),
+                "impulses settle after [s]": float(impulses[0, i]), "penalty settles after [s]": float(theirs),
                 "at a damping of [N s/m]": float(damping),
             }  # fmt: skip
 
@@ -220,6 +212,7 @@ C21 = Check(
     "m/T whose force at first contact equals the impulse's, and at the best of all larger dampings, chosen afterwards "
     "for each wall.",
     tolerance="None: the law with the smaller time wins. A wall cannot tell if the mass settles with neither.",
-    cases=_maps, row=_settling, holds=_settles, says=_settling_says, draw=_fresh_maps, parts=["against"],
+    cases=lambda study: [(loop, grid(study.depth)[0]) for loop in loops()], row=_settling, holds=_settles,
+    says=_settling_says, draw=_draw, parts=["against"],
     conditions=["rate", "delay", "device damping", "stiffness"], axes=("stiffness", "rate", "against"),
 )  # fmt: skip

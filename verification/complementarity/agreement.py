@@ -20,9 +20,9 @@ slower contact pulls. Neither the restitution nor any other component of the vel
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -50,85 +50,55 @@ MOMENTUM = 1e-9
 Resolver = Callable[[ImpactCase], tuple[np.ndarray, np.ndarray]]
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """IAPB and the Newton LCP on one case; distances in the kinetic metric, relative to |v⁻|.
-
-    distance : |v⁺ − v⁺_LCP|; cone_distance : distance of IAPB's impulse from {Jᵀp : p >= 0}
-    energy_lost, energy_lost_law : loss of kinetic energy under IAPB and under the LCP, as a share of KE⁻
-    adhesion : "none", "artefact of the minimum norm" or "adhesive"
-    adhesive_share : sum of the pulling impulses that IAPB returns, divided by the sum of all |p|
-    approaching, approaching_law : whether a contact, given or touching, still approaches after the impact
-    momentum_residual : share of M(v⁺−v⁻) outside range(Jᵀ)
-    """
-
-    case: ImpactCase
-    distance: float
-    cone_distance: float
-    energy_lost: float
-    energy_lost_law: float
-    adhesion: str
-    adhesive_share: float
-    approaching: bool
-    approaching_law: bool
-    momentum_residual: float
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the two laws give the same velocity."""
-        return self.distance <= SAME
-
-    @property
-    def pushes(self) -> bool:
-        """Whether some p >= 0 gives IAPB's velocity."""
-        return self.cone_distance <= PUSHED
-
-    @property
-    def contradicts(self) -> bool:
-        """Whether the case contradicts "the laws agree if and only if some p >= 0 gives IAPB's velocity"."""
-        near, far = sorted((self.distance, self.cone_distance))
-        return near <= SAME and far > PUSHED
-
-    @property
-    def defect(self) -> float:
-        """Largest error of statements 1 and 3: |distance − cone_distance|, and that of the energy as a share of KE⁻."""
-        e = self.case.restitution
-        energy = self.energy_lost - self.energy_lost_law - (1.0 - e) / (1.0 + e) * self.distance**2
-        return max(abs(self.distance - self.cone_distance), abs(energy))
-
-
 def iapb(case: ImpactCase) -> tuple[np.ndarray, np.ndarray]:
     """Return v⁺ and p of the engine."""
-    impact = resolve_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
+    impact = resolve_impact(*case.arrays, case.restitution)
     return impact.velocity, impact.impulses
 
 
-def compare_case(case: ImpactCase, resolver: Resolver = iapb) -> Comparison:
+def compare_case(case: ImpactCase, resolver: Resolver = iapb) -> dict[str, Any]:
     """Compare a resolver's outcome with the Newton LCP's on one case.
+
+    Returns
+    -------
+    dict
+        distance : |v⁺ − v⁺_LCP|; cone distance : distance of the impulse from {Jᵀp : p >= 0}; both in the kinetic
+        metric, relative to |v⁻|.  agrees : whether the velocities are equal; pushes : whether some p >= 0 gives v⁺;
+        contradicts : whether one holds without the other, which statement 1 excludes.
+        extra loss : loss of kinetic energy beyond that of the LCP, as a share of KE⁻.
+        defect : largest error of statements 1 and 3.
+        adhesion : "none", "artefact of the minimum norm" or "adhesive"; adhesive share : sum of the pulling impulses,
+        divided by the sum of all |p|.
+        approaching, approaching by the LCP : whether a contact, given or touching, still approaches.
+        outside : share of M(v⁺−v⁻) outside range(Jᵀ).
 
     Raises
     ------
     SolverError
         The law's own solver leaves a residual, so there is no solution to compare with.
     """
-    problem = ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
+    problem = ImpactProblem.from_impact(*case.arrays, case.restitution)
     v, p = resolver(case)
     law = newton_lcp(problem).velocity
-    upper = np.linalg.cholesky(case.mass_matrix).T
+    upper, e = case.lower.T, case.restitution
     before, change = upper @ case.velocity, upper @ (v - case.velocity)
     speed = float(np.linalg.norm(before)) or 1.0
     total, scale = float(np.abs(p).sum()), float(np.abs(problem.gamma_minus).max(initial=0.0)) or 1.0
     rows = case.contact_jacobian if case.touching is None else np.vstack([case.contact_jacobian, case.touching])
-    return Comparison(
-        case, distance=float(np.linalg.norm(upper @ (v - law))) / speed,
-        cone_distance=_cone_distance(problem, change) / speed,
-        energy_lost=_lost(before, change), energy_lost_law=_lost(before, upper @ (law - case.velocity)),
-        adhesion=adhesion(case.contact_jacobian, p, case.mass_matrix),
-        adhesive_share=float(-p[p < 0.0].sum()) / total if total > 0.0 else 0.0,
-        approaching=bool(np.any(rows @ v < -APPROACHING * scale)),
-        approaching_law=bool(np.any(rows @ law < -APPROACHING * scale)),
-        momentum_residual=_outside(problem.factor, change),
-    )  # fmt: skip
+    distance, cone = float(np.linalg.norm(upper @ (v - law))) / speed, _cone_distance(problem.factor, change) / speed
+    extra = _lost(before, change) - _lost(before, upper @ (law - case.velocity))
+    near, far = sorted((distance, cone))
+    return {
+        "impacts": case.family, "e": e, "redundant rows": case.redundancy, "distance": distance, "cone distance": cone,
+        "agrees": distance <= SAME, "pushes": cone <= PUSHED, "contradicts": near <= SAME and far > PUSHED,
+        "extra loss": extra,
+        "defect": max(abs(distance - cone), abs(extra - (1.0 - e) / (1.0 + e) * distance**2)),
+        "adhesion": adhesion(case.contact_jacobian, p, case.mass_matrix),
+        "adhesive share": float(-p[p < 0.0].sum()) / total if total > 0.0 else 0.0,
+        "approaching": bool(np.any(rows @ v < -APPROACHING * scale)),
+        "approaching by the LCP": bool(np.any(rows @ law < -APPROACHING * scale)),
+        "outside": _outside(problem.factor, change),
+    }  # fmt: skip
 
 
 def _lost(before: np.ndarray, change: np.ndarray) -> float:
@@ -137,11 +107,11 @@ def _lost(before: np.ndarray, change: np.ndarray) -> float:
     return -float(before @ change + 0.5 * change @ change) / energy if energy > 0.0 else 0.0
 
 
-def _cone_distance(problem: ImpactProblem, change: np.ndarray) -> float:
+def _cone_distance(rows: np.ndarray, change: np.ndarray) -> float:
     """Return the distance of a change of velocity from {Aᵀp : p >= 0}, by non-negative least squares on unit rows."""
     from scipy.optimize import nnls
 
-    rows, size = problem.factor, float(np.linalg.norm(change))
+    size = float(np.linalg.norm(change))
     if not len(rows) or size == 0.0:
         return size
     length = np.linalg.norm(rows, axis=1)
@@ -159,53 +129,50 @@ def _outside(rows: np.ndarray, change: np.ndarray) -> float:
 
 def compare_cases(
     cases: Iterable[ImpactCase], resolver: Resolver = iapb, failures: list[Failure] | None = None
-) -> tuple[Comparison, ...]:
-    """Compare IAPB with the LCP on every case; `failures` receives the cases that raise an exception."""
+) -> list[dict[str, Any]]:
+    """Return `compare_case` of every case; `failures` receives the cases that raise an exception."""
     found = (attempt(f"{case.family}, e = {case.restitution:g}, impact {number}",
                      partial(compare_case, case, resolver), failures)
              for number, case in enumerate(cases, 1))  # fmt: skip
-    return tuple(comparison for comparison in found if comparison is not None)
+    return [row for row in found if row is not None]
 
 
-def map_rows(comparisons: Iterable[Comparison]) -> Iterator[Row]:
+GROUP = ("impacts", "e", "redundant rows")
+
+
+def map_rows(compared: Iterable[Row]) -> Iterator[Row]:
     """Yield a row for each family, restitution and redundancy, in the order of their first appearance."""
-    groups: dict[tuple[str, float, int], list[Comparison]] = {}
-    for found in comparisons:
-        case = found.case
-        groups.setdefault((case.family, case.restitution, case.redundancy), []).append(found)
-    for (family, e, redundancy), members in groups.items():
-        apart = [m.distance for m in members if not m.agrees]
-        yield {
-            "impacts": family, "e": e, "redundant rows": redundancy, "cases": len(members),
-            "share that agrees": _share(m.agrees for m in members),
-            "share that truly pulls": _share(m.adhesion == ADHESIVE for m in members),
-            "share that pulls as chosen": _share(m.adhesion == ARTEFACT for m in members),
-            "negative share of p": float(np.mean([m.adhesive_share for m in members])),
-            "median distance where they differ": float(np.median(apart)) if apart else None,
-            "largest distance": max(m.distance for m in members),
-            "largest extra loss of KE⁻": max(0.0, *(m.energy_lost - m.energy_lost_law for m in members)),
-            "left approaching by IAPB": _share(m.approaching for m in members),
-            "left approaching by the LCP": _share(m.approaching_law for m in members),
-            "contradictions": sum(m.contradicts for m in members), "defect": max(m.defect for m in members),
-            "momentum outside range(Jᵀ)": max(m.momentum_residual for m in members),
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for found in compared:
+        groups.setdefault(tuple(found[key] for key in GROUP), []).append(found)
+    for group, members in groups.items():
+        every = {key: np.array([one[key] for one in members]) for key in members[0]}
+        apart = every["distance"][~every["agrees"]]
+        shares = {
+            "share that agrees": every["agrees"], "share that truly pulls": every["adhesion"] == ADHESIVE,
+            "share that pulls as chosen": every["adhesion"] == ARTEFACT, "negative share of p": every["adhesive share"],
         }  # fmt: skip
-
-
-def _share(outcomes: Iterable[bool]) -> float:
-    return float(np.mean([bool(outcome) for outcome in outcomes]))
+        yield {
+            **dict(zip(GROUP, group, strict=True)), "cases": len(members),
+            **{key: float(np.mean(values)) for key, values in shares.items()},
+            "median distance where they differ": float(np.median(apart)) if len(apart) else None,
+            "largest distance": float(every["distance"].max()),
+            "largest extra loss of KE⁻": max(0.0, float(every["extra loss"].max())),
+            "left approaching by IAPB": float(np.mean(every["approaching"])),
+            "left approaching by the LCP": float(np.mean(every["approaching by the LCP"])),
+            "contradictions": int(every["contradicts"].sum()), "defect": float(every["defect"].max()),
+            "momentum outside range(Jᵀ)": float(every["outside"].max()),
+        }  # fmt: skip
 
 
 COUNTS = {"quick": 25, "full": 250}  # impacts of each family, restitution and redundancy
 SCENE_RESTITUTIONS = (None, 0.5)  # e of the scene (None), and e = 0.5, which gives more impacts, some of which differ
 
 
-def _random(study: Study, family: str) -> Iterator[Row]:
-    return map_rows(compare_cases(random_cases(COUNTS[study.depth], families=[family]), failures=study.failures))
-
-
-def _of_scene(study: Study, name: str) -> Iterator[Row]:
-    impacts = [scene_impacts(name, restitution=e) for e in SCENE_RESTITUTIONS]
-    cases = [case for found in impacts for case in found.cases]
+def _compared(study: Study, name: str) -> Iterator[Row]:
+    """Return the rows of a family or of a scene."""
+    cases = random_cases(COUNTS[study.depth], families=[name]) if name in FAMILIES else (
+        case for e in SCENE_RESTITUTIONS for case in scene_impacts(name, restitution=e).cases)
     return map_rows(compare_cases(cases, failures=study.failures))
 
 
@@ -250,8 +217,7 @@ def _agreement(rows: Sequence[Row]) -> float:
 MAP = Check(
     key="map", question="With equal e the laws agree if and only if some p >= 0 gives IAPB's velocity.",
     cases=lambda study: [*FAMILIES, *scene_names()],
-    row=lambda study, name: _random(study, name) if name in FAMILIES else _of_scene(study, name),
-    holds=lambda row: row["contradictions"] == 0 and row["defect"] <= PUSHED
+    row=_compared, holds=lambda row: row["contradictions"] == 0 and row["defect"] <= PUSHED
     and row["momentum outside range(Jᵀ)"] <= MOMENTUM,
     says=_map_says, digits=3,
     note="IAPB and the Newton LCP; distances in the kinetic metric, relative to |v⁻|. An impact truly pulls where no "
@@ -275,12 +241,11 @@ def _two_contacts(study: Study, point: tuple[float, float, ImpactCase]) -> Row:
     cosine, ratio, case = point
     found = compare_case(case)
     return {"cosine": cosine, "speed ratio": ratio, "agreement predicted": ratio >= cosine,
-            "agreement found": found.agrees, "distance": found.distance}  # fmt: skip
+            "agreement found": found["agrees"], "distance": found["distance"]}  # fmt: skip
 
 
 TWO_CONTACTS = Check(
     key="two contacts", question="Two contacts with approach speeds 1 and r, whose rows have the cosine c in the "
     "kinetic metric: the laws agree exactly where r >= c.",
     cases=_grid, row=_two_contacts, holds=lambda row: row["agreement predicted"] == row["agreement found"], digits=3,
-    note="Two contacts with approach speeds 1 and r, whose rows have this cosine in the kinetic metric.",
 )  # fmt: skip

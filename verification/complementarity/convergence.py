@@ -5,18 +5,18 @@ velocities in L¹ over time, because a small shift of an impact in time changes 
 two levels has several step lengths, because the position of an impact within a step is arbitrary. The order of
 convergence follows from the largest errors of the two levels.
 
-TRUTH_SCENES are small scenes in space that have an event-driven solution; only this study uses them.
+The folder `scenes` beside this module has small scenes in space that have such a solution; only this study uses them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from iapb.errors import SolverError
-from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
 from reference.scene_events import SceneTruth, scene_truth
 from reference.time_stepping import RigidConstraints
@@ -25,6 +25,7 @@ from verification.check import Check
 from verification.finding import verdict_of_trials
 from verification.table import HOLDS, Table
 
+TRUTH_SCENES = {path.stem: path for path in sorted((Path(__file__).parent / "scenes").glob("*.yaml"))}
 COARSE, FINE = (470.0, 500.0, 530.0), (1880.0, 2000.0, 2120.0)  # rates [Hz]; a factor of four between the levels
 _LEVELS = 4.0
 # The convergence counts as first order if the errors per step on the fine level are at most this multiple of those on
@@ -36,8 +37,7 @@ WORTH = 0.1
 _ROUNDING = 1e-7  # per second of step: smaller errors are rounding and count as zero
 
 
-@dataclass(frozen=True)
-class TruthCase:
+class TruthCase(NamedTuple):
     """A scene, a duration before its impacts accumulate [s], and whether the run includes device and coupling."""
 
     scene: str
@@ -119,8 +119,8 @@ def _require_worth(case: TruthCase, truth: SceneTruth, position: float, velocity
 
 
 def scene_of(name: str) -> Scene:
-    """Return a scene of TRUTH_SCENES or of the project by name."""
-    return scene_from_text(TRUTH_SCENES[name]) if name in TRUTH_SCENES else load_scene(find_scene(name))
+    """Return a scene of the folder `scenes` beside this module, or of the project, by name."""
+    return load_scene(TRUTH_SCENES.get(name) or find_scene(name))
 
 
 def _errors(scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: float) -> tuple[float, float]:
@@ -132,53 +132,6 @@ def _errors(scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: fl
     q, v = truth.state(np.minimum(run.time, truth.end))
     return float(np.abs(run.q - q).max() * rate), float(np.abs(run.v - v).sum(axis=0).max())
 
-
-_DROPPED = """
-name: %s
-dimensions: 3
-rate: 1000
-duration: 1
-gravity: [0, 0, -9.81]
-bodies:
-  - {name: body, joint: free_flyer, mass: 0.5, inertia: [2e-4, 3e-4, 4e-4], shapes: [%s],
-     position: [0, 0, 0.2, 0, 0, 0, 1], velocity: [0.3, -0.2, 0, %s]}
-walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0.1, 1]}]
-contact: {forces: paper, restitution: %g, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
-"""
-_BALL, _BOX = "{kind: sphere, radius: 0.04, center: [0.01, 0, 0]}", "{kind: box, size: [0.06, 0.08, 0.03]}"
-
-_SPHERE = (
-    "  - {name: ball_%d, joint: free_flyer, mass: %g, inertia: [1e-4, 1e-4, 1e-4], "
-    "shapes: [{kind: sphere, radius: 0.02}],\n     position: [%g, 0, 0, 0, 0, 0, 1], velocity: [%g, 0, 0, 0, 0, 0]}\n"
-)
-_CRADLE = (
-    "name: cradle_in_space\ndimensions: 3\nrate: 1000\nduration: 1\nbodies:\n"
-    + "".join(_SPHERE % row for row in ((0, 0.2, 0.0, 1.0), (1, 0.4, 0.0613, 0.0), (2, 0.2, 0.1227, 0.0)))
-    + "contact: {forces: paper, restitution: 0.7, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}\n"
-)
-
-_SWINGING_ARM = """
-name: arm_meets_a_wall_in_space
-dimensions: 3
-rate: 1000
-duration: 1
-gravity: [0, 0, -9.81]
-bodies:
-  - {name: upper, joint: spherical, mass: 1, inertia: [2e-3, 1e-2, 1e-2], center_of_mass: [0.15, 0, 0]}
-  - {name: lower, parent: upper, joint: revolute, axis: [0, 1, 0], origin: [0.3, 0, 0], mass: 0.5,
-     inertia: [1e-3, 4e-3, 4e-3], center_of_mass: [0.1, 0, 0], velocity: [1],
-     shapes: [{kind: sphere, radius: 0.03, center: [0.25, 0, 0]}]}
-walls: [{name: wall, kind: half_space, point: [0, 0, -0.2], normal: [0.2, 0, 1]}]
-contact: {forces: paper, restitution: 0, friction: 0, stiffness: 1e4, damping: 0, friction_velocity: 1e-2}
-"""
-
-TRUTH_SCENES = {
-    "ball_dropped_in_space": _DROPPED % ("ball_dropped_in_space", _BALL, "5, 3, 1", 0.6),
-    "box_dropped_in_space": _DROPPED % ("box_dropped_in_space", _BOX, "3, 2, 1", 0.3),
-    "box_landing_in_space": _DROPPED % ("box_landing_in_space", _BOX, "3, 2, 1", 0.0),
-    "cradle_in_space": _CRADLE,
-    "arm_meets_a_wall_in_space": _SWINGING_ARM,
-}
 
 QUICK = ("two_discs", "bernoulli_balls", "two_link_arm_a", "peg_corner", "peg_hole", "arm_pushing",
          "ball_dropped_in_space")  # the scenes of the quick depth

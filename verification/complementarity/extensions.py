@@ -12,12 +12,12 @@ can gain energy even if all contacts approach.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
-from iapb import FrictionalImpact, resolve_frictional_impact, resolve_impact
+from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import SolverError
 from reference.complementarity.laws import (
     LAWS,
@@ -31,7 +31,7 @@ from reference.complementarity.problem import ImpactProblem
 from verification.check import Check, Study
 from verification.complementarity.families import random_mass_matrix
 from verification.finding import verdict_of_trials
-from verification.impacts import Floats
+from verification.impacts import Floats, ImpactCase
 from verification.table import Row
 
 # The sweeps of NSGS reach about 1e-10 of the velocities; outcomes of two different laws differ by far more.
@@ -45,57 +45,54 @@ UNEQUAL_COUNTS = {"quick": 100, "full": 1000}
 LAW_OF_UNEQUAL = "IAPB, unequal restitution"
 
 
-class Impact(NamedTuple):
-    """An impact with tangents (c, m, d), whose velocities are compared in the kinetic metric."""
-
-    mass: Floats
-    rows: Floats
-    tangents: Floats
-    velocity: Floats
-
-    @property
-    def energy(self) -> float:
-        """KE⁻ [J]."""
-        return 0.5 * float(self.velocity @ self.mass @ self.velocity)
-
-    def gain(self, v_plus: Floats) -> float:
-        """Return (KE⁺ − KE⁻)/KE⁻."""
-        return (0.5 * float(v_plus @ self.mass @ v_plus) - self.energy) / self.energy
-
-    def distance(self, first: Floats, second: Floats) -> float:
-        """Return the distance of two velocities in the kinetic metric, relative to |v⁻|."""
-        change = first - second
-        return float(np.sqrt(change @ self.mass @ change / (2.0 * self.energy)))
-
-
-def draw(rng: np.random.Generator, approaching: bool) -> Impact:
+def draw(rng: np.random.Generator, approaching: bool) -> ImpactCase:
     """Draw an impact with one to three contacts, one or two tangents each, and three to eight coordinates."""
     d, c, m = int(rng.integers(3, 9)), int(rng.integers(1, 4)), int(rng.integers(1, 3))
     velocity, rows = rng.normal(size=d), rng.normal(size=(c, d))
     if approaching:
         rows = np.where(rows @ velocity > 0.0, -1.0, 1.0)[:, None] * rows
-    return Impact(random_mass_matrix(rng, d), rows, 0.5 * rng.normal(size=(c, m, d)), velocity)
+    mass = random_mass_matrix(rng, d)
+    return ImpactCase(mass, rows, velocity, tangents=0.5 * rng.normal(size=(c, m, d)))
+
+
+def _form(impact: ImpactCase, v: Floats) -> float:
+    """Return vᵀ M v, twice the kinetic energy [J]."""
+    return float(v @ impact.mass_matrix @ v)
+
+
+def _gain(impact: ImpactCase, v_plus: Floats) -> float:
+    """Return (KE⁺ − KE⁻)/KE⁻."""
+    before = _form(impact, impact.velocity)
+    return (_form(impact, v_plus) - before) / before
+
+
+def _distance(impact: ImpactCase, first: Floats, second: Floats) -> float:
+    """Return the distance of two velocities in the kinetic metric, relative to |v⁻|."""
+    return float(np.sqrt(_form(impact, first - second) / _form(impact, impact.velocity)))
 
 
 def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Row:
     """Compare the engine's frictional impact with Coulomb's NCP and CCP on random impacts with one e and one μ."""
     (e, mu), rng = case, np.random.default_rng(seed)
-    impacts = [draw(rng, approaching=True) for _ in range(COUNTS[study.depth])]
+    drawn = [draw(rng, approaching=True) for _ in range(COUNTS[study.depth])]
+    impacts = [replace(one, restitution=e, friction=np.full(one.contacts, mu)) for one in drawn]
     pushing = same = reduced = unsolved = 0
     of_ours, of_ncp, of_ccp, distances = list[float](), list[float](), list[float](), list[float]()
     for impact in impacts:
-        ours = resolve_frictional_impact(impact.mass, impact.rows, impact.tangents, impact.velocity, e, mu)
-        of_ours.append(ours.energy_change / impact.energy)
+        mass, rows, v = impact.arrays
+        ours = resolve_frictional_impact(*impact.given())
+        of_ours.append(2.0 * ours.energy_change / _form(impact, v))
         reduced += ours.friction_share < 1.0
         ncp, ccp = _counterparts(impact, e, mu)
         for gains, v_plus in ((of_ncp, ncp), (of_ccp, ccp)):
             if v_plus is not None:
-                gains.append(impact.gain(v_plus))
+                gains.append(_gain(impact, v_plus))
         if ncp is None or ours.status != "complete":
             unsolved += 1
             continue
-        distances.append(impact.distance(ours.velocity, ncp))
-        if _pushes(impact, e, ours):
+        distances.append(_distance(impact, ours.velocity, ncp))
+        without = resolve_impact(mass, rows, v, e).impulses
+        if ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0:  # all push, either way
             pushing += 1
             same += distances[-1] <= SAME_WITH_FRICTION
     return {
@@ -107,17 +104,11 @@ def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Ro
     }  # fmt: skip
 
 
-def _pushes(impact: Impact, e: float, ours: FrictionalImpact) -> bool:
-    """Return whether every contact pushes, with friction and without it, and friction is not reduced."""
-    without = resolve_impact(impact.mass, impact.rows, impact.velocity, e).impulses
-    return bool(ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0)
-
-
-def _counterparts(impact: Impact, e: float, mu: float) -> Iterator[Floats | None]:
+def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | None]:
     """Yield v⁺ of the NCP and of the CCP; None for a problem that NSGS does not solve."""
-    blocks = np.concatenate([impact.rows[:, None, :], impact.tangents], axis=1)
-    rows, size = blocks.reshape(-1, blocks.shape[2]), blocks.shape[1]
-    problem = ImpactProblem.from_impact(impact.mass, rows, impact.velocity, e, mu, contact_size=size)
+    mass, rows, v = impact.arrays
+    blocks = np.concatenate([rows[:, None, :], impact.tangents], axis=1)
+    problem = ImpactProblem.from_impact(mass, blocks.reshape(-1, len(v)), v, e, mu, contact_size=blocks.shape[1])
     for law in (coulomb_ncp, coulomb_ccp):
         try:
             yield law(problem).velocity
@@ -142,13 +133,12 @@ def with_unequal(study: Study, signs: str, seed: int = 45) -> Row:
     distances, gains = [], np.zeros((count, 3))
     for k in range(count):
         impact = draw(rng, approaching=signs == "all approach")
-        e = rng.choice([0.0, 0.2, 0.7, 1.0], size=len(impact.rows))
-        ours = resolve_impact(impact.mass, impact.rows, impact.velocity, e)
-        problem = ImpactProblem.from_impact(impact.mass, impact.rows, impact.velocity, e)
+        e = rng.choice([0.0, 0.2, 0.7, 1.0], size=impact.contacts)
+        ours, problem = resolve_impact(*impact.arrays, e), ImpactProblem.from_impact(*impact.arrays, e)
         if len(set(e)) > 1:
-            distances.append(impact.distance(ours.velocity, poisson(problem).velocity))
-        gains[k] = [ours.energy_change / impact.energy,
-                    *(impact.gain(law(problem).velocity) for law in (newton_lcp, newton_equality))]  # fmt: skip
+            distances.append(_distance(impact, ours.velocity, poisson(problem).velocity))
+        gains[k] = [2.0 * ours.energy_change / _form(impact, impact.velocity),
+                    *(_gain(impact, law(problem).velocity) for law in (newton_lcp, newton_equality))]  # fmt: skip
     names = ("largest change of KE, IAPB", "Newton LCP", "equalities")
     return {"contacts": signs, "cases": count, "distance from Poisson's law": max(distances, default=None),
             **dict(zip(names, gains.max(axis=0).tolist(), strict=True))}  # fmt: skip

@@ -11,14 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from iapb.errors import ArgumentError
-from iapb.names import one_of
+from reference import Floats
 from verification.impacts import ImpactCase
-
-Floats = NDArray[np.float64]
-
 
 Draw = Callable[[np.random.Generator, int], tuple[Floats, Floats, Floats]]  # (rng, redundancy) -> (M, J, v)
 
@@ -28,8 +23,6 @@ def random_cases(
 ) -> Iterator[ImpactCase]:
     """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the same impacts."""
     for name in families or FAMILIES:
-        if name not in FAMILIES:
-            raise ArgumentError("families", name, one_of(name, FAMILIES, "some of "))
         draw, redundancies = FAMILIES[name]
         for redundancy in redundancies:
             rng = np.random.default_rng([seed, list(FAMILIES).index(name), redundancy])

@@ -114,18 +114,15 @@ def compare_pile(case: ImpactCase, rows: str = "approaching") -> dict[str, Any]:
     given = case.contact_jacobian[case.contact_jacobian @ v < 0.0] if rows == "approaching" else case.contact_jacobian
     equal, equality = timed(partial(resolve_impact, mass, given, v, 0.0))
     push, pushing = timed(partial(resolve_impact, mass, given, v, 0.0, method="poisson"))
-    kinetic = np.linalg.cholesky(mass).T
-    speed, p = float(np.linalg.norm(kinetic @ v)), equal.impulses
-    law = newton_lcp(ImpactProblem.from_impact(mass, given, v, 0.0)).velocity
-    distance = float(np.linalg.norm(kinetic @ (equal.velocity - push.velocity))) / speed
+    law, p = newton_lcp(ImpactProblem.from_impact(mass, given, v, 0.0)).velocity, equal.impulses
+    distance = case.distance(equal.velocity, push.velocity)
     agrees, asked = distance <= PUSHED, len(given) <= 4 * ASKED and len(v) <= 3 * ASKED
     return {
         "contacts": len(given), "redundant": len(given) - equal.rank, "share that agrees": agrees,
         "distance": distance, "share of impulses that pull":
         float(np.mean(p < -PULLS * np.abs(p).max(initial=0.0))) if len(p) else 0.0,
         "negative share of p": float(-p[p < 0.0].sum() / (np.abs(p).sum() or 1.0)),
-        "pushing from the LCP": float(np.linalg.norm(kinetic @ (push.velocity - law))) / speed,
-        "gain": push.energy_change / (0.5 * speed**2),
+        "pushing from the LCP": case.distance(push.velocity, law), "gain": push.energy_change / (0.5 * case.speed**2),
         "contradicted": asked and nonnegative_impulse(given, equal.generalized_impulse, mass).exists != agrees,
         **dict(zip(TIMES, (equality, pushing), strict=True)),
     }  # fmt: skip

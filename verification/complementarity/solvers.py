@@ -10,14 +10,13 @@ hyperstatic families, and patches with friction. They are the same in every call
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.errors import ArgumentError
 from reference.complementarity.benchmark import SolverRow, performance_profile, run_solvers
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Solution
@@ -30,8 +29,8 @@ from verification.complementarity.of_runs import scene_impacts
 from verification.cost.problems import patch, pile
 from verification.cost.solvers import LONGEST
 from verification.finding import Failure, attempt, verdict_of_trials
-from verification.hard_cases import HARD_CASES, HardCase
-from verification.impacts import Floats, ImpactCase
+from verification.hard_cases import HARD_CASES
+from verification.impacts import Floats
 from verification.table import Row
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
@@ -57,31 +56,6 @@ class ProblemStudy(NamedTuple):
     def solvers(self) -> tuple[str, ...]:
         """Names of the solvers in the order of their first use."""
         return tuple(dict.fromkeys(row.solver for row in self.rows))
-
-
-def study_problems(
-    folder: Path | str, longest: float = np.inf, progress: Progress | None = None,
-    failures: list[Failure] | None = None,
-) -> ProblemStudy:
-    """Read every problem file below `folder` and solve it with every solver for its kind of problem.
-
-    Parameters
-    ----------
-    longest : if a solver needs more time than this [s], it skips all problems with more unknowns
-    failures : receives the problems that raise an exception; if it is None, the exception propagates
-
-    Raises
-    ------
-    ArgumentError
-        If the folder does not exist.
-    """
-    read, unread = list[StoredProblem](), dict[str, str]()
-    for path in problem_files(folder):
-        try:
-            read.append(read_problem(path))
-        except DatasetError as error:
-            unread[path.name] = str(error)
-    return study_read(str(folder), read, unread, longest, progress, failures)
 
 
 def study_read(
@@ -132,13 +106,17 @@ def _line(stored: StoredProblem, rows: list[SolverRow], solvers: Mapping[str, An
 
 
 def on_problems(study: Study, name: str, folder: Path | None) -> ProblemStudy:
-    """Return the study of a folder, or of our own problems, made once."""
-    longest = LONGEST[study.depth]
+    """Return the study of every problem file below a folder, or of our own problems, made once."""
 
     def make() -> ProblemStudy:
-        if folder is None:
-            return study_read(name, own_problems(study.failures), longest=longest, failures=study.failures)
-        return study_problems(folder, longest, failures=study.failures)
+        read, unread = list[StoredProblem](), dict[str, str]()
+        for path in problem_files(folder) if folder is not None else ():
+            try:
+                read.append(read_problem(path))
+            except DatasetError as error:
+                unread[path.name] = str(error)
+        given = own_problems(study.failures) if folder is None else read
+        return study_read(name, given, unread, LONGEST[study.depth], failures=study.failures)
 
     return study.once(("problems", name), make)
 
@@ -176,8 +154,6 @@ SOLVER_LIST = Check(
 )  # fmt: skip
 
 
-Maker = Callable[[str], ImpactProblem]  # name -> problem
-
 # Hard cases of the catalogue with few contacts. Cases with many contacts take the slowest solvers minutes.
 HARD = ("nearly_parallel_normals", "printed_formula_gains", "hilbert_rows", "kahan_rows", "mass_ratio",
         "tiny_lever_arm", "face_at_three_points", "grazing", "subnormal_speeds", "light_direction",
@@ -192,53 +168,41 @@ _SEED = 9
 
 def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, ...]:
     """Return all problems of our own, frictionless ones first; `failures` receives those that cannot be made."""
-    makers: dict[str, Maker] = {f"hard case {name}": partial(_hard_case, name) for name in HARD}
-    makers |= {f"impact of {name}": partial(_scene_impact, name) for name in SCENES}
-    makers |= dict(_hyperstatic()) | dict(_with_friction())
-    made = (attempt(name, partial(make, name), failures) for name, make in makers.items())
-    return tuple(StoredProblem(problem, format="built here") for problem in made if problem is not None)
-
-
-def _hard_case(hard: str, name: str) -> ImpactProblem:
-    case = HARD_CASES[hard]()
-    if not isinstance(case, HardCase):
-        raise ArgumentError("HARD", hard, "the name of a hard impact")
-    mass, rows, velocity = case.mass_matrix, case.contact_jacobian, case.velocity
-    return ImpactProblem.from_impact(mass, rows, velocity, case.restitution, name=name)
-
-
-def _scene_impact(scene: str, name: str) -> ImpactProblem:
-    """Return the impact of a scene with the most contacts."""
-    return _posed(max(scene_impacts(scene).cases, key=lambda case: case.contacts), name)
-
-
-def _hyperstatic() -> Iterator[tuple[str, Maker]]:
+    makers: dict[str, Callable[[], tuple[Any, ...]]] = {f"hard case {name}": partial(_hard, name) for name in HARD}
+    makers |= {f"impact of {name}": partial(_widest, name) for name in SCENES}
     for case in random_cases(1, restitutions=(0.5,), families=FAMILIES, seed=_SEED):
         if case.redundancy:
-            yield f"{case.family}, {case.redundancy} redundant of {case.contacts}", partial(_posed, case)
+            makers[f"{case.family}, {case.redundancy} redundant of {case.contacts}"] = partial(_given, case)
     for contacts in HYPERSTATIC_CONTACTS:
         for make in (patch, pile):
             case = make(contacts, np.random.default_rng([_SEED, contacts]))
-            yield f"{make.__name__} of {contacts}", partial(_posed, case)
+            makers[f"{make.__name__} of {contacts}"] = partial(_given, case)
+    makers |= {f"patch of {contacts}, μ = {mu:g}": partial(_rough_patch, contacts, mu)
+               for contacts in FRICTIONAL_CONTACTS for mu in FRICTIONS}
+    makers |= {f"rod between walls, μ = {mu:g}": partial(_wedged_rod, mu) for mu in FRICTIONS}
+    made = {name: attempt(name, given, failures) for name, given in makers.items()}
+    return tuple(StoredProblem(ImpactProblem.from_impact(*given, name=name), format="built here")
+                 for name, given in made.items() if given is not None)  # fmt: skip
 
 
-def _posed(case: ImpactCase, name: str) -> ImpactProblem:
-    return ImpactProblem.from_impact(*case.arrays, case.restitution, name=name)
+def _given(case: Any) -> tuple[Any, ...]:
+    """Return M, J, v and e of an impact or a hard case."""
+    return case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution
 
 
-def _with_friction() -> Iterator[tuple[str, Maker]]:
-    """Yield a box that lands on a patch and slides with dry friction, and a rod wedged between two walls."""
-    for contacts in FRICTIONAL_CONTACTS:
-        for mu in FRICTIONS:
-            yield f"patch of {contacts}, μ = {mu:g}", partial(_rough_patch, contacts, mu)
-    for mu in FRICTIONS:
-        yield f"rod between walls, μ = {mu:g}", partial(_wedged_rod, mu)
+def _hard(name: str) -> tuple[Any, ...]:
+    return _given(HARD_CASES[name]())
 
 
-def _rough_patch(contacts: int, mu: float, name: str) -> ImpactProblem:
+def _widest(scene: str) -> tuple[Any, ...]:
+    """Return the impact of a scene with the most contacts."""
+    return _given(max(scene_impacts(scene).cases, key=lambda case: case.contacts))
+
+
+def _rough_patch(contacts: int, mu: float) -> tuple[Any, ...]:
+    """Return M, rows, v, e and μ of a box that lands on a patch and slides with dry friction."""
     case = patch(contacts, np.random.default_rng([_SEED, contacts, 3]))
-    rows = _with_tangents(case.contact_jacobian)
-    return ImpactProblem.from_impact(case.mass_matrix, rows, case.velocity, 0.0, mu, name=name)
+    return case.mass_matrix, _with_tangents(case.contact_jacobian), case.velocity, 0.0, mu
 
 
 def _with_tangents(normals: np.ndarray) -> Floats:
@@ -250,16 +214,10 @@ def _with_tangents(normals: np.ndarray) -> Floats:
     return np.array(rows)
 
 
-def _wedged_rod(mu: float, name: str) -> ImpactProblem:
-    """A turning rod whose ends press on two facing walls: the normals are opposite, so friction alone can hold it."""
-    points, normals = ((-0.6, -0.8), (0.6, 0.8)), ((1.0, 0.0), (-1.0, 0.0))
-    rows = [_row(np.array(point), np.array(direction)) for point, (x, y) in zip(points, normals, strict=True)
+def _wedged_rod(mu: float) -> tuple[Any, ...]:
+    """Return a turning rod whose ends press on two facing walls: only friction can hold it, as the normals oppose."""
+    ends = (((-0.6, -0.8, 0.0), (1.0, 0.0)), ((0.6, 0.8, 0.0), (-1.0, 0.0)))
+    rows = [np.concatenate([direction, np.cross(point, direction)]) for point, (x, y) in ends
             for direction in ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))]  # fmt: skip
-    velocity = np.array([0.0, -0.4, 0.1, 0.0, 0.0, 0.7])
     mass = np.diag([1.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0])
-    return ImpactProblem.from_impact(mass, np.array(rows), -velocity, 0.0, mu, name=name)
-
-
-def _row(point: Floats, direction: Floats) -> Floats:
-    """Return the row that maps (v, ω) to the velocity of the point (x, y) along a direction."""
-    return np.concatenate([direction, np.cross([*point, 0.0], direction)])
+    return mass, np.array(rows), -np.array([0.0, -0.4, 0.1, 0.0, 0.0, 0.7]), 0.0, mu

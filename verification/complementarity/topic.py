@@ -19,7 +19,7 @@ from verification.complementarity.solvers import OWN, SOLVER_LIST, collections
 from verification.cost.solvers import IMPACT_TIMES
 from verification.cost.steps import STEP_TIMES
 from verification.finding import REPRODUCED, Part
-from verification.mechanics.engine_differences import scene_difference
+from verification.mechanics.against_pinocchio import scene_difference
 from verification.table import Row, Table
 
 # Optional folder of contact problems by others, next to the project. A clone does not need it.
@@ -61,17 +61,11 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
             "reproduced without restriction.")
 
 
-def _difference(study: Study, name: str) -> Row:
-    d = scene_difference(load_scene(find_scene(name)), CONFIGURATIONS)
-    return {"scene": d.scene, "configurations": d.configurations, "with other contacts": d.apart, "M": d.mass_matrix,
-            "B + G": d.inner_forces, "frame Jacobians": d.frame_jacobian, "contacts": d.contacts, "gap [m]": d.gap,
-            "normal": d.normal, "contact row": d.row}  # fmt: skip
-
-
 REFERENCES = Check(
     key="references", question="The references compute M and B + G with Pinocchio and contacts in closed form; the "
     "engine's agree to 1e-12.",
-    cases=lambda study: scene_names(), row=_difference, digits=2,
+    cases=lambda study: scene_names(), digits=2,
+    row=lambda study, name: scene_difference(load_scene(find_scene(name)), CONFIGURATIONS),
     holds=lambda row: max(row["M"], row["B + G"], row["gap"]) <= SAME_MECHANICS,
     note="Largest differences between engine and reference: relative to the largest entry for M, B + G and Jacobians, "
     "absolute for contacts. Contacts differ, for example, where two faces are equally deep.",

@@ -9,13 +9,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb import resolve_impact
 from iapb.compiled import block, kernel
 from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
 from iapb.errors import MissingDependencyError, SolverError
-from iapb.linalg import cholesky, from_whitened, to_whitened
+from iapb.linalg import add_multiple, cholesky, dot_of, from_whitened, to_whitened
 from iapb.schema import zeros_of
 from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.solvers.lemke import import_lcp_lemke
@@ -23,8 +22,7 @@ from verification.impacts import ImpactCase
 from verification.methods import gram_pinv
 
 PRINTED = "printed formula (numpy)"
-Floats = NDArray[Any]
-Call = Callable[[], Floats]
+Call = Callable[[], Any]  # returns v⁺ (d,)
 
 
 def engine_call(case: ImpactCase) -> Call:
@@ -51,25 +49,21 @@ class KernelCall:
 
     kernel: Callable[..., Any]
     given: tuple[Any, ...]
-    v_plus: Floats
+    v_plus: Any
 
     def repeated(self, times: int) -> None:
         """Resolve the impact `times` times."""
         self.kernel(*self.given, self.v_plus, times)
 
-    def __call__(self) -> Floats:
+    def __call__(self) -> Any:
         """Return v⁺ (d,)."""
         self.repeated(1)
         return self.v_plus
 
 
-def _arrays(case: ImpactCase) -> tuple[Any, ...]:
-    return tuple(np.ascontiguousarray(array) for array in case.arrays)
-
-
 def kernel_call(case: ImpactCase, budget: int | None = None) -> KernelCall:
     """Return a call of the engine's kernel with at most `budget` rows; it factors M and copies the rows."""
-    mass, rows, v = _arrays(case)
+    mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     work = block(zeros_of(ImpactWork, velocity=d, row=c))
     return KernelCall(repeat_impact, (mass, np.zeros((d, d)), v, case.restitution, np.ascontiguousarray(rows.T),
@@ -78,7 +72,7 @@ def kernel_call(case: ImpactCase, budget: int | None = None) -> KernelCall:
 
 def sweeps_call(case: ImpactCase, sweeps: int) -> KernelCall:
     """Return a call of projected Gauss-Seidel."""
-    mass, rows, v = _arrays(case)
+    mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     return KernelCall(repeat_sweeps, (mass, np.zeros((d, d)), v, case.restitution, rows, sweeps, np.zeros((c, d)),
                                       np.zeros(c), np.zeros(c), np.zeros(c)), np.zeros(d))  # fmt: skip
@@ -107,12 +101,12 @@ def daqp_call(case: ImpactCase) -> Call:
         import daqp
     except ImportError as error:
         raise MissingDependencyError("daqp", "DAQP", "pip install 'iapb[reference]'") from error
-    mass, rows, v = _arrays(case)
+    mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     lower, change, unit, least = np.zeros((d, d)), np.zeros(d), np.zeros((c, d)), np.zeros(c)
     form = np.eye(d), np.zeros(d), unit, np.full(c, 1e30), least, np.zeros(c, np.int32)
 
-    def call() -> Floats:
+    def call() -> Any:
         scale = pose_velocity_form(mass, lower, rows, v, case.restitution, unit, least)
         x, _, flag, _ = daqp.solve(*form, primal_tol=DAQP_TOLERANCE, dual_tol=DAQP_TOLERANCE)
         if flag < 1:
@@ -142,13 +136,9 @@ def repeat_impact(  # type: ignore[no-untyped-def]
 def whiten_rows(lower, rows, whitened, square):  # type: ignore[no-untyped-def]
     """Write A = J L⁻ᵀ (c, d), row by row, and the squared lengths of its rows (c,)."""
     for i in range(rows.shape[0]):
-        square[i] = 0.0
         for k in range(rows.shape[1]):
-            rest = rows[i, k]
-            for m in range(k):
-                rest -= lower[k, m] * whitened[i, m]
-            whitened[i, k] = rest / lower[k, k]
-            square[i] += whitened[i, k] * whitened[i, k]
+            whitened[i, k] = (rows[i, k] - dot_of(lower[k], whitened[i, :k])) / lower[k, k]
+        square[i] = dot_of(whitened[i], whitened[i])
 
 
 @kernel
@@ -160,27 +150,19 @@ def repeat_sweeps(  # type: ignore[no-untyped-def]
     It forms no Delassus matrix: each contact reads u and corrects it. `whitened` is A (c, d); `share` holds the squared
     lengths of its rows, `wanted` the velocity that each contact should have afterwards.
     """
-    c, d = rows.shape
     for _ in range(times):
         cholesky(mass_matrix, lower)
         to_whitened(lower, v, v_plus)
         whiten_rows(lower, rows, whitened, share)
-        for i in range(c):
-            impulses[i] = wanted[i] = 0.0
-            for k in range(d):
-                wanted[i] -= restitution * rows[i, k] * v[k]
+        for i in range(rows.shape[0]):
+            impulses[i] = 0.0
+            wanted[i] = -restitution * dot_of(rows[i], v)
         for _sweep in range(sweeps):
-            for i in range(c):
-                if share[i] == 0.0:
-                    continue
-                closing = -wanted[i]
-                for k in range(d):
-                    closing += whitened[i, k] * v_plus[k]
-                impulse = max(0.0, impulses[i] - closing / share[i])
-                change = impulse - impulses[i]
-                impulses[i] = impulse
-                for k in range(d):
-                    v_plus[k] += change * whitened[i, k]
+            for i in range(rows.shape[0]):
+                if share[i] > 0.0:
+                    impulse = max(0.0, impulses[i] - (dot_of(whitened[i], v_plus) - wanted[i]) / share[i])
+                    add_multiple(v_plus, impulse - impulses[i], whitened[i])
+                    impulses[i] = impulse
         from_whitened(lower, v_plus, v_plus)
 
 
@@ -190,20 +172,17 @@ def pose_velocity_form(mass_matrix, lower, rows, v, restitution, unit, least):  
 
     x is the change of u = Lᵀ v, divided by the scale.
     """
-    c, d = rows.shape
     cholesky(mass_matrix, lower)
     whiten_rows(lower, rows, unit, least)
     scale = 0.0
-    for i in range(c):
+    for i in range(rows.shape[0]):
         length = math.sqrt(least[i]) if least[i] > 0.0 else 1.0
-        speed = 0.0
-        for k in range(d):
-            speed += rows[i, k] * v[k]
+        for k in range(rows.shape[1]):
             unit[i, k] /= length
-        least[i] = -(1.0 + restitution) * speed / length
+        least[i] = -(1.0 + restitution) * dot_of(rows[i], v) / length
         scale = max(scale, abs(least[i]))
     if scale == 0.0:
         scale = 1.0
-    for i in range(c):
+    for i in range(rows.shape[0]):
         least[i] /= scale
     return scale

@@ -10,13 +10,12 @@ whole run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb import decide_effects, find_scene, load_scene
 from iapb.advice.effects import EFFECT_NAMES
@@ -27,13 +26,12 @@ from iapb.errors import IapbError
 from iapb.haptics.coupling import NoCoupling
 from iapb.scene import Scene, scene_names
 from iapb.simulation import Simulation
+from reference import Floats
 from reference.worlds import World, find_world
 from verification.clock import Times, take_turns
 from verification.cost.steps import RecordedLoop
 from verification.finding import Failure, attempt, counted
 from verification.table import Row, Table, table_from
-
-Floats = NDArray[np.float64]
 
 ROUNDS = 9  # number of rounds; each loop runs once per round
 SAMPLES = 400  # number of instants at which positions are compared
@@ -171,24 +169,18 @@ def saved(ratio: Times) -> float | None:
 def summary(effects: Mapping[str, Table]) -> Table:
     """Return the data of the figure of time and error, one row per scene and measured effect."""
 
-    def rows(scene: str, table: Table) -> list[Row]:
-        measured = [row | {"time saved": row["time saved"] or 0.0} for row in table.records()
+    def rows(scene: str, table: Table) -> Iterator[Row]:
+        measured = [(row["time saved"] or 0.0, row["position"], row["effect"]) for row in table.records()
                     if row["position"] is not None]
-        return [{"scene": scene, "effect": row["effect"], "time saved [%]": row["time saved"],
-                 "error [mm]": row["position"],
-                 "best of its error": "no" if any(_beats(other, row) for other in measured) else "yes"}
-                for row in measured]  # fmt: skip
+        for time, error, effect in measured:
+            beaten = any(t >= time and e <= error and (t, e) != (time, error) for t, e, _ in measured)
+            yield {"scene": scene, "effect": effect, "time saved [%]": time, "error [mm]": error,
+                   "best of its error": "no" if beaten else "yes"}  # fmt: skip
 
     return table_from((row for given in effects.items() for row in rows(*given)), digits=3,
                       timed=("time saved", "best of its error"),
                       note="Best of its error: no other effect saves more time without a larger error. "
                       f"A time saved of 0: {_BELOW}.")
-
-
-def _beats(other: Row, row: Row) -> bool:
-    """Whether leaving out `other` saves at least as much time with at most the same error, and is better in one."""
-    one, two = ((each["time saved"], -each["position"]) for each in (other, row))
-    return one[0] >= two[0] and one[1] >= two[1] and one != two
 
 
 def steps(effects: Mapping[str, Table]) -> Table:

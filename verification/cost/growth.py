@@ -10,7 +10,7 @@ import numpy as np
 
 from reference.one_thread import one_thread
 from verification.check import Check, Study
-from verification.clock import TIMES, sampler, seconds, take_turns, target, time_cells
+from verification.clock import TIMES, limited, sampler, seconds, take_turns, time_cells
 from verification.cost.calls import PRINTED, Call, kernel_call, printed_call
 from verification.cost.problems import random_impact
 from verification.finding import Failure, Part, attempt
@@ -65,18 +65,10 @@ def printed_over_factored(table: Table) -> Iterator[tuple[int, float, float, flo
 
 
 def _scaling_says(table: Table) -> Iterator[Part]:
-    for contacts, ours, printed, ratio in printed_over_factored(table):
-        yield target(
-            f"With 12 coordinates and {contacts} contacts the engine's (factored) impact takes {ours:.3g} µs, the "
-            f"printed formula {printed:.3g} µs: {ratio:.0f} times as long. Target: at least {FACTORS[contacts]:g}.",
-            ratio >= FACTORS[contacts], f"the factored impact of {contacts} contacts is {ratio:.0f} times as fast as "
-            f"the printed formula (target {FACTORS[contacts]:g})")  # fmt: skip
-
-
-def along(table: Table, method: str, axis: str) -> tuple[list[float], list[float]]:
-    """Return sizes and times of a method over an axis: "contacts" at d = 12, or "coordinates" at 60 contacts."""
-    chosen = table.where(method=method, **({"coordinates": 12} if axis == "contacts" else {"contacts": 60}))
-    return chosen.column(axis), chosen.column("time")
+    for contacts, ours, _, ratio in printed_over_factored(table):
+        yield limited(f"with 12 coordinates and {contacts} contacts the printed formula takes", ratio,
+                      FACTORS[contacts], " times the time of the engine's (factored) impact", f" of {ours:.3g} µs",
+                      least=True)  # fmt: skip
 
 
 def power_law(sizes: Sequence[float], values: Sequence[float]) -> float:
@@ -93,25 +85,19 @@ def steepest(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, fl
 
 
 def fitted(table: Table, method: str, axis: str) -> Row:
-    """Return the exponent of a method over an axis, and where it is steepest."""
-    sizes, times = along(table, method, axis)
+    """Return the exponent of a method, and where it is steepest, over the contacts at d = 12 or the coordinates at 60
+    contacts."""
+    chosen = table.where(method=method, **({"coordinates": 12} if axis == "contacts" else {"contacts": 60}))
+    sizes, times = chosen.column(axis), chosen.column("time")
     low, high, there = steepest(sizes, times)
     return {"method": method, "axis": axis, "exponent": power_law(sizes, times), "steepest from": low, "to": high,
             "there": there}  # fmt: skip
 
 
 def _growth_says(table: Table) -> Part:
-    rows = {(row["method"], row["axis"]): row for row in table.records()}
-    ours, wide, printed = (rows[key] for key in ((FACTORED, "contacts"), (FACTORED, "coordinates"),
-                                                 (PRINTED, "contacts")))  # fmt: skip
-    ends = ["(steepest from {steepest from:g} to {to:g}: {there:.2f})".format_map(row) for row in (ours, wide)]
-    sizes, power = [c for d, c in SIZES if d == 12], ours["exponent"]
-    return target(
-        f"The time of the factored impact grows as the number of contacts to the power {power:.2f} from {min(sizes)} "
-        f"to {max(sizes)} contacts {ends[0]}, that of the printed formula to the power {printed['exponent']:.2f}. With "
-        f"the number of coordinates it grows to the power {wide['exponent']:.2f} {ends[1]}. Target: at most "
-        f"{LARGEST_EXPONENT:g} for contacts.", power <= LARGEST_EXPONENT,
-        f"the impact's time grows as contacts to the power {power:.2f} (target {LARGEST_EXPONENT:g})")  # fmt: skip
+    [ours] = table.where(method=FACTORED, axis="contacts").records()
+    return limited("the time of the factored impact grows as the number of contacts to the power", ours["exponent"],
+                   LARGEST_EXPONENT, "", " (steepest from {steepest from:g} to {to:g}: {there:.2f})".format_map(ours))
 
 
 SCALING = Check(

@@ -32,9 +32,9 @@ from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.simulation import Simulation
 from reference.worlds import find_world
 from verification.check import Check, Study
-from verification.clock import LEAST_ROUNDS, TIMES, seconds, take_turns, target, time_cells, timed
+from verification.clock import LEAST_ROUNDS, TIMES, limited, seconds, take_turns, time_cells, timed
 from verification.cost.growth import power_law, steepest
-from verification.cost.resting import RestingScene, resting_scenes
+from verification.cost.resting import RESTING, RestingScene
 from verification.finding import NOT_COMPUTED, Part
 from verification.table import Row, Table
 
@@ -80,15 +80,11 @@ TARGETS = {"peg in the corner": 0.1}
 SPATIAL_TARGET = 0.5
 
 
-def _scene(name: str) -> RestingScene:
-    return next(scene for scene in resting_scenes() if scene.name == name)
-
-
 def race(study: Study, name: str, steps: int = STEPS) -> Iterator[Row]:
     """Yield the times of a step of one scene against MuJoCo's, with every form and solver."""
-    scene = _scene(name)
-    ours = OwnLoop(scene, steps)
-    theirs = {(form, solver): _Theirs(scene, form, solver, steps) for form in scene.models for solver in SOLVERS}
+    ours = OwnLoop(RESTING[name], steps)
+    theirs = {(form, solver): _Theirs(RESTING[name], form, solver, steps)
+              for form in RESTING[name].forms for solver in SOLVERS}  # fmt: skip
     times = take_turns({"ours": ours.sample, **{key: other.sample for key, other in theirs.items()}},
                        ROUNDS[study.depth])  # fmt: skip
     for (form, solver), other in theirs.items():
@@ -100,59 +96,47 @@ def race(study: Study, name: str, steps: int = STEPS) -> Iterator[Row]:
                "MuJoCo's drift": other.moved}  # fmt: skip
 
 
-def fastest_of_theirs(races: Table) -> list[Row]:
-    """Return the row with MuJoCo's fastest solver for each scene and form."""
-    by: dict[tuple[str, str], Row] = {}
-    for row in sorted(races.records(), key=lambda row: float(row["MuJoCo's step"])):
-        by.setdefault((row["scene"], row["MuJoCo's form"]), row)
-    return list(by.values())
-
-
 def _races_say(races: Table) -> Iterator[Part]:
+    """Yield a part per scene on the form whose fastest solver leaves us the largest ratio."""
     if not races.rows:
         yield Part("Time of a step compared with MuJoCo: MuJoCo is not installed: pip install 'iapb[peers]'.",
                    NOT_COMPUTED, timed=True)
-        return
-    for scene in dict.fromkeys(races.column("scene")):
-        forms = [row for row in fastest_of_theirs(races) if row["scene"] == scene]
-        texts = ["{ratio:.2g} times MuJoCo's time with {MuJoCo's form} ({MuJoCo's contacts:.0f} contacts, solver "
-                 "{MuJoCo's solver}, quartiles {quartiles})".format_map(row) for row in forms]  # fmt: skip
-        ours, wanted = forms[0]["iapb's contacts"], forms[0]["target"]
-        largest = max(row["ratio"] for row in forms)
-        yield target(
-            f"{scene.capitalize()}, at rest: a recorded step of the engine, with {ours:.0f} contacts, takes "
-            f"{'; '.join(texts)}. Target: at most {wanted:g}.", largest <= wanted,
-            f"a step of the {scene} takes {largest:.2g} of MuJoCo's time (target {wanted:g})")  # fmt: skip
+    fastest: dict[tuple[str, str], Row] = {}
+    for row in sorted(races.records(), key=lambda row: float(row["MuJoCo's step"])):
+        fastest.setdefault((row["scene"], row["MuJoCo's form"]), row)
+    for scene in dict.fromkeys(races.column("scene") if races.rows else ()):
+        worst = max((row for (name, _), row in fastest.items() if name == scene), key=lambda row: float(row["ratio"]))
+        yield limited(f"a recorded step of the {scene}, at rest, takes", worst["ratio"], worst["target"],
+                      " times MuJoCo's time", " ({MuJoCo's form}, {MuJoCo's contacts:.0f} contacts, solver "
+                      "{MuJoCo's solver}; {iapb's contacts:.0f} contacts of ours)".format_map(worst))  # fmt: skip
 
 
 class OwnLoop:
     """The scene in our loop; every sample starts again and settles before the timed steps."""
 
     def __init__(self, scene: RestingScene, steps: int) -> None:
-        self.simulation = Simulation(scene_from_text(scene.text, scene.file))
-        self.settling, self.steps = scene.settling, steps
+        self.simulation, self.settling, self.steps = Simulation(scene.ours()), scene.settling, steps
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
         """Return the time per step [s]."""
-        self.settle()
-        simulation, record = self.simulation, _record(self.simulation, self.steps)
+        simulation, record = self.simulation, self._settled()
         before = simulation.state.q.copy()
         _, spent = timed(lambda: simulation.advance_chunk(record, self.steps))
         self.contacts = float(record.steps.contact_count.mean())
         self.moved = float(np.abs(simulation.state.q - before).max())
         return spent / self.steps
 
-    def settle(self) -> None:
-        """Start from the first state and simulate until the scene is at rest."""
+    def _settled(self) -> Any:
+        """Start from the first state, simulate until the scene is at rest, and return an empty record."""
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.port = system.make_state(), system.make_port(simulation.coupling)
         simulation.advance_chunk(_record(simulation, self.settling), self.settling)
+        return _record(simulation, self.steps)
 
     def part(self, number: int) -> float:
         """Return the time of one of PARTS per step [s], on the scene at rest."""
-        self.settle()
-        simulation, record = self.simulation, _record(self.simulation, self.steps)
+        simulation, record = self.simulation, self._settled()
         arguments = simulation.world, simulation.state, simulation.port, record, number, self.steps
         return timed(lambda: repeat_part(*arguments))[1] / self.steps
 
@@ -161,7 +145,7 @@ class _Theirs:
     """The scene in MuJoCo's loop."""
 
     def __init__(self, scene: RestingScene, form: str, solver: str, steps: int) -> None:
-        self.scene, self.model, self.steps = scene, scene.models[form](solver), steps
+        self.scene, self.model, self.steps = scene, scene.model(form, solver), steps
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
@@ -182,7 +166,7 @@ class _Theirs:
 
 RACES = Check(
     key="steps against MuJoCo", question="How long is a step, compared with MuJoCo's?", row=race, says=_races_say,
-    cases=lambda _: [scene.name for scene in resting_scenes()] if find_spec("mujoco") else (), digits=3,
+    cases=lambda _: RESTING if find_spec("mujoco") else (), digits=3,
     timed=("MuJoCo's step", "ratio", "quartiles", "iapb's drift", "MuJoCo's drift"),
     note="Frictionless (condim 1), with the same masses, forces and step; MuJoCo's other options have default values. "
     "The engine's steps are recorded, MuJoCo's are not. Ratios are computed for each round of timing; median and "
@@ -222,7 +206,7 @@ def repeat_part(world: Any, state: Any, port: Any, record: Any, part: Any, times
 
 def profile(study: Study, name: str) -> list[Row]:
     """Return the times of the whole step and of each of its parts on a scene at rest."""
-    loop = OwnLoop(_scene(name), STEPS)
+    loop = OwnLoop(RESTING[name], STEPS)
     parts = {part: partial(loop.part, k) for k, part in enumerate(PARTS)}
     times = take_turns({"whole step": loop.sample, **parts}, 15 if study.depth == "full" else 7)
     return [{"scene": name, "part": part, **time_cells(taken)} for part, taken in times.items()]
@@ -230,8 +214,7 @@ def profile(study: Study, name: str) -> list[Row]:
 
 PROFILE = Check(
     key="parts of a step", question="Where does the time of a step go?", row=profile, timed=TIMES, digits=3,
-    cases=lambda _: [scene.name for scene in resting_scenes()],
-    note="Each part repeated by itself in compiled code.",
+    cases=lambda _: RESTING, note="Each part repeated by itself in compiled code.",
 )  # fmt: skip
 
 
@@ -290,24 +273,16 @@ def _tested(simulation: Simulation) -> int:
 def _bodies_say(table: Table) -> Iterator[Part]:
     rows = [row for row in table.records() if row["bodies"] >= LEAST_BODIES]
     bodies, times, pairs = ([row[key] for row in rows] for key in ("bodies", "step", "pairs tested"))
-    power, tested, last = power_law(bodies, times), power_law(bodies, pairs), rows[-1]
-    where = ""
+    power, more = power_law(bodies, times), ""
     if len(rows) > 2:
         low, high, slope = steepest(bodies, times)
-        touching = {row["bodies"]: row["contacts"] for row in rows}
-        where = (f"; it grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}, where the contacts "
-                 f"in a step increase from {touching[low]:.2g} to {touching[high]:.2g}")
-    yield target(
-        f"A step of {last['bodies']} free bodies takes {last['step']:.3g} µs. From {LEAST_BODIES} bodies on the time "
-        f"grows as their number to the power {power:.2f}, fitted over all sizes{where}. Target: at most "
-        f"{LARGEST_POWER:g}.", power <= LARGEST_POWER,
-        f"the time of a step grows as the number of bodies to the power {power:.2f} (target {LARGEST_POWER:g})",
-        quantities=(("exponent of bodies", f"{power:.2f}"),))  # fmt: skip
-    yield target(
-        f"With the broad phase the number of tested pairs of shapes grows as the number of bodies to the power "
-        f"{tested:.2f}: {last['pairs tested']:.0f} of {last['pairs of shapes']:,} pairs for {last['bodies']} free "
-        f"bodies. Target: at most {LARGEST_POWER:g}.", tested <= LARGEST_POWER,
-        f"the pairs tested grow as the number of bodies to the power {tested:.2f}", timed=False)  # fmt: skip
+        more = f"; it grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}"
+    yield limited(f"from {LEAST_BODIES} free bodies on the time of a step grows as their number to the power", power,
+                  LARGEST_POWER, "", more, quantities=(("exponent of bodies", f"{power:.3g}"),))  # fmt: skip
+    last = rows[-1]
+    yield limited("the tested pairs of shapes grow as the number of bodies to the power", power_law(bodies, pairs),
+                  LARGEST_POWER, "", f": {last['pairs tested']:.0f} of {last['pairs of shapes']:,} pairs for "
+                  f"{last['bodies']} free bodies", timed=False)  # fmt: skip
 
 
 BODIES = Check(
@@ -367,19 +342,17 @@ _FIRST_STEPS = (
 def start_up(study: Study, what: str) -> Iterator[Row]:
     """Time `iapb --help`, or the first steps without and with a cache of compiled kernels."""
 
-    def row(what: str, spent: Any, processes: int, limit: float) -> Row:
-        wall, computing = (float(each) for each in spent)
-        return {"what": what, "on the wall [s]": wall, "computing [s]": computing, "processes": processes,
-                "target [s]": limit}  # fmt: skip
-
-    if what == HELP:
-        helps = [process_time(["-m", "reports.cli", "--help"], {}) for _ in range(_HELPS)]
-        yield row(HELP, np.median(helps, axis=0), _HELPS, HELP_LIMIT)
-        return
     with tempfile.TemporaryDirectory() as cache:
-        first, second = (np.array(process_time(["-c", _FIRST_STEPS], {"NUMBA_CACHE_DIR": cache})) for _ in range(2))
-    yield row("first steps, all kernels compiled", first - second, 1, COMPILE_LIMIT)
-    yield row("first steps, kernels from the cache", second, 1, COMPILE_LIMIT)
+        if what == HELP:
+            helps = [process_time(["-m", "reports.cli", "--help"], {}) for _ in range(_HELPS)]
+            found = {HELP: (np.median(helps, axis=0), _HELPS, HELP_LIMIT)}
+        else:
+            both = [np.array(process_time(["-c", _FIRST_STEPS], {"NUMBA_CACHE_DIR": cache})) for _ in range(2)]
+            found = {"first steps, all kernels compiled": (both[0] - both[1], 1, COMPILE_LIMIT),
+                     "first steps, kernels from the cache": (both[1], 1, COMPILE_LIMIT)}  # fmt: skip
+    for name, (spent, processes, limit) in found.items():
+        yield {"what": name, "on the wall [s]": float(spent[0]), "computing [s]": float(spent[1]),
+               "processes": processes, "target [s]": limit}  # fmt: skip
 
 
 def process_time(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:
@@ -393,10 +366,8 @@ def process_time(arguments: list[str], environment: dict[str, str]) -> tuple[flo
 
 def _start_says(table: Table) -> Iterator[Part]:
     for row in table.records():
-        yield target(
-            f"{row['what']} takes {row['on the wall']:.2f} s of wall time and {row['computing']:.2f} s of CPU time. "
-            f"Target: less than {row['target']:g} s of CPU time.", row["computing"] < row["target"],
-            f"{row['what']} takes {row['computing']:.2f} s of CPU time (target {row['target']:g} s)")  # fmt: skip
+        yield limited(f"the wait for {row['what']} is", row["computing"], row["target"], " s of CPU time",
+                      f", {row['on the wall']:.2f} s of wall time")  # fmt: skip
 
 
 START = Check(

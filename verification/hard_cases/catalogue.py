@@ -1,41 +1,95 @@
-"""The catalogue of hard cases. To add a case, write a function that returns it and add a line here."""
+"""The catalogue of hard cases. To add one, write it in impacts.yaml or as a function that returns it; name it here."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
 
-from verification.hard_cases import (
-    bodies,
-    friction,
-    mechanical,
-    motions,
-    numerical,
-    shared_problems,
-    sticking,
-)
-from verification.hard_cases.case import AnyCase
+import numpy as np
+from ruamel.yaml import YAML
+
+from verification.hard_cases import friction, motions, numerical, shared_problems, sticking
+from verification.hard_cases.case import AnyCase, FrictionalCase, HardCase
+
+
+@cache
+def _written() -> dict[str, dict[str, Any]]:
+    found: dict[str, dict[str, Any]] = YAML(typ="safe").load(Path(__file__).with_name("impacts.yaml"))
+    return found
+
+
+def written_case(name: str) -> HardCase:
+    """Return an impact of impacts.yaml."""
+    given = _written()[name]
+    arrays = {key: np.array(given[key], dtype=object) for key in ("M", "J", "v", "e", "T") if key in given}
+    exact, numbers = _fractions(arrays["J"]), {key: _fractions(array).astype(float) for key, array in arrays.items()}
+    mass, e = numbers["M"], numbers["e"]
+    arguments: dict[str, Any] = dict(
+        name=given["name"], source=given["source"], why_hard=given["why hard"], expected=given["expected"],
+        mass_matrix=np.diag(mass) if mass.ndim == 1 else mass, contact_jacobian=numbers["J"], velocity=numbers["v"],
+        restitution=e if e.ndim else float(e), exact_jacobian=exact if "/" in str(given["J"]) else None,
+        methods=tuple(given["methods"]) if "methods" in given else None)
+    if "T" in given:
+        return FrictionalCase(**arguments, tangent=numbers["T"], friction=float(given["friction"]))
+    return HardCase(**arguments)
+
+
+def _fractions(array: Any) -> Any:
+    """Return the array with texts such as "3/5" as fractions."""
+    return np.vectorize(lambda x: Fraction(x) if isinstance(x, str) else x, otypes=[object])(array)
+
+
+def _named(*cases: Callable[[], AnyCase] | str) -> dict[str, Callable[[], AnyCase]]:
+    """Return functions by their names, and the cases of impacts.yaml with these names."""
+    return {case if isinstance(case, str) else case.__name__:
+            partial(written_case, case) if isinstance(case, str) else case for case in cases}  # fmt: skip
+
 
 HARD_CASES: dict[str, Callable[[], AnyCase]] = {
-    case.__name__: case
-    for case in (
-        numerical.no_contact, numerical.one_contact, numerical.hundred_contacts, numerical.thousand_copies,
-        numerical.ten_thousand_contacts, numerical.nearly_parallel_normals, numerical.printed_formula_gains,
-        numerical.hilbert_rows, numerical.kahan_rows,
-        mechanical.mass_ratio, mechanical.tiny_lever_arm, mechanical.straight_arm,
-        mechanical.face_at_three_points, mechanical.grazing, mechanical.subnormal_speeds,
-        mechanical.light_direction, mechanical.bar_with_unequal_restitution, mechanical.wedged_peg,
-        bodies.touching_cradle_impact, bodies.break_shot, bodies.rocking_block, bodies.superball,
-        bodies.stack_of_mass_ratio, bodies.wedge, bodies.painleve_impact, bodies.sleeping_top,
-        bodies.rolling_coin, bodies.rattleback,
-        friction.double_pendulum_without_friction, friction.double_pendulum_with_friction,
+    "no_contact": partial(numerical.contacts, 0, "No contact at all",
+                          "empty matrices, which libraries treat differently", "nothing happens, and no error"),
+    "one_contact": partial(numerical.contacts, 1, "One contact", "it is not: every method must solve this case",
+                           "(19) to rounding"),
+    "hundred_contacts": partial(numerical.contacts, 100, "100 contacts of rank three",
+                                "97 redundant rows, each exact in doubles",
+                                "exact rank, and the velocity that three contacts give"),
+    **_named(numerical.thousand_copies),
+    "ten_thousand_contacts": partial(numerical.contacts, 10_000, "10,000 contacts of rank three",
+                                     "time and memory: the Delassus matrix has 1e8 entries", "linear time and exact "
+                                     "rank; methods that form the Delassus matrix exceed the limit on time"),
+    **_named(
+        "nearly_parallel_normals", numerical.printed_formula_gains, numerical.hilbert_rows, numerical.kahan_rows,
+        "mass_ratio", "tiny_lever_arm", "straight_arm", "face_at_three_points", "grazing", "subnormal_speeds",
+        numerical.light_direction, "bar_with_unequal_restitution", "wedged_peg",
+        "touching_cradle_impact", "break_shot", "rocking_block", "superball", "stack_of_mass_ratio", "wedge",
+        "painleve_impact", "sleeping_top", "rolling_coin", "rattleback",
+        "double_pendulum_without_friction", "double_pendulum_with_friction",
         shared_problems.bowl_of_low_rank, shared_problems.bowl_of_mixed_scales,
-        motions.wall_at_the_bound, motions.wall_beyond_the_bound, motions.wall_far_beyond_the_bound,
-        motions.wedged_peg_motion, motions.touching_cradle, motions.touching_cradle_in_centimetres,
-        motions.cradle_a_micrometre_apart, motions.cradle_a_micrometre_sunk,
-        friction.double_pendulum_motion, friction.sticking_threshold, friction.sliding_threshold,
-        friction.creep_of_the_regularised_law, friction.painleve_rod, friction.stick_slip,
-        sticking.nudged_box, sticking.box_on_a_slope, sticking.stack_on_a_slope,
-        motions.chatter,
-        shared_problems.two_balls_and_a_wall,
-    )
+    ),
+    "wall_at_the_bound": partial(motions.wall, 1, "the largest stiffness for which passivity is proved",
+                                 "in no world does the wall give energy"),
+    "wall_beyond_the_bound": partial(
+        motions.wall, 500, "a penalty wall throws the handle back faster than it arrived",
+        "an impulse stops the handle before the spring is compressed: the wall gives no energy"),
+    "wall_far_beyond_the_bound": partial(
+        motions.wall, 2000, "only the spring acts while the contact lasts, and one time step is as long as a bounce",
+        "impulses do not make a spring this stiff passive; only the rigid wall is"),
+    **_named(motions.wedged_peg_motion),
+    "touching_cradle": partial(motions.cradle, 0.0, "touching exactly"),
+    "touching_cradle_in_centimetres": partial(motions.cradle, 0.0, "touching but for rounding", 0.01),
+    "cradle_a_micrometre_apart": partial(motions.cradle, 1e-6, "a micrometre apart"),
+    "cradle_a_micrometre_sunk": partial(motions.cradle, -1e-6, "sunk by a micrometre"),
+    **_named(friction.double_pendulum_motion),
+    "sticking_threshold": partial(friction.pushed, 0.99, "Sticking, 1 % below the threshold",
+                                  "it sticks; (6) would creep at 0.99 v_threshold for ever"),
+    "sliding_threshold": partial(friction.pushed, 1.01, "Sliding, 1 % above the threshold",
+                                 "it slides by ½ 0.01 μ g t²; (6) would run ahead by nearly v_threshold t"),
+    **_named(friction.creep_of_the_regularised_law, friction.painleve_rod, friction.stick_slip, sticking.nudged_box),
+    "box_on_a_slope": partial(sticking.on_a_slope, "Box that sticks on a slope", "box_on_a_slope", 1, sticking.BOX),
+    "stack_on_a_slope": partial(sticking.on_a_slope, "Stack that sticks on a slope", "stack_on_a_slope", 3,
+                                sticking.SLAB),
+    **_named(motions.chatter, shared_problems.two_balls_and_a_wall),
 }  # fmt: skip

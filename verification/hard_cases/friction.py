@@ -19,10 +19,7 @@ from iapb.run import Run
 from iapb.scene import Scene
 from verification.hard_cases.case import (
     COULOMB,
-    NEWTON_COULOMB,
     NO_GAIN,
-    FrictionalCase,
-    HardCase,
     Measured,
     TrajectoryCase,
     largest_gain,
@@ -34,37 +31,7 @@ _WORLDS = ("IAPB", "PB", COULOMB)
 
 # --- Kane and Levinson's double pendulum -----------------------------------------------------------------------
 _SOURCE = "Kane and Levinson, Dynamics: Theory and Applications (1985); Kane (1984); angles and speeds ours"
-_S1, _C1, _S2, _C2 = 5 / 13, 12 / 13, 8 / 17, 15 / 17
-_MASS = np.array([[4 / 3, 0.5 * (_C1 * _C2 + _S1 * _S2)], [0.5 * (_C1 * _C2 + _S1 * _S2), 1 / 3]])
-_NORMAL, _TANGENT = np.array([[_S1, _S2]]), np.array([[_C1, _C2]])
-_VELOCITY = np.array([-0.1, -0.2])
-_RESTITUTION, _FRICTION = 0.5, 0.5
-_FLOOR = -(_C1 + _C2) - 1e-3  # [m] height of the floor: a millimetre below the tip
-
-
-def double_pendulum_without_friction() -> HardCase:
-    """The impact of the double pendulum without friction, as in the paper's assumption (iii)."""
-    return HardCase(
-        "Kane and Levinson's double pendulum, frictionless impact",
-        _SOURCE,
-        "the motions of the two rods are coupled: the effective mass of the tip is a fifth of a rod's",
-        "½ (1 − e²) γ²/W is lost, as Theorem 1 says",
-        _MASS, _NORMAL, _VELOCITY, _RESTITUTION,
-    )  # fmt: skip
-
-
-def double_pendulum_with_friction() -> HardCase:
-    """The impact of the double pendulum with friction: Newton's and Coulomb's laws together gain energy."""
-    return FrictionalCase(
-        "Kane and Levinson's double pendulum, impact with friction",
-        _SOURCE,
-        "friction reverses the slip: with Newton's and Coulomb's laws unchanged the energy triples",
-        "restitution is met and no energy is gained: friction is reduced until it creates none",
-        _MASS, _NORMAL, _VELOCITY, _RESTITUTION, methods=("factored", NEWTON_COULOMB), tangent=_TANGENT,
-        friction=_FRICTION,
-    )  # fmt: skip
-
-
+_FLOOR = -(12 / 13 + 15 / 17) - 1e-3  # [m] height of the floor: a millimetre below the tip
 _ROD_BODY = {"joint": "revolute", "mass": 1.0, "center_of_mass": [0.5, 0.0], "inertia": 1.0 / 12.0}
 _PENDULUM = [
     {"name": "upper", **_ROD_BODY, "position": [math.atan2(5, 12) - math.pi / 2]},
@@ -72,7 +39,7 @@ _PENDULUM = [
      "shapes": [{"kind": "circle", "radius": 1e-6, "center": [1.0, 0.0]}],
      "position": [math.atan2(8, 15) - math.atan2(5, 12)]},
 ]  # fmt: skip
-_ON_TIP = {"restitution": _RESTITUTION, "friction": _FRICTION, "stiffness": 1e4, "damping": 100.0,
+_ON_TIP = {"restitution": 0.5, "friction": 0.5, "stiffness": 1e4, "damping": 100.0,
            "coherence_distance": 1e-2}  # fmt: skip
 
 
@@ -109,8 +76,6 @@ def _measure_pendulum(run: Run) -> Measured:
 @cache
 def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
     """Return the time at which the tip touches the floor [s], and the two angles to the horizontal until then."""
-    from scipy.integrate import solve_ivp
-
     start = np.array([math.atan2(5, 12) - math.pi / 2, math.atan2(8, 15) - math.pi / 2, 0.0, -0.1])
 
     def rate(_: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -122,9 +87,17 @@ def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
     def touches(_: float, state: NDArray[np.float64]) -> float:
         return float(np.sin(state[:2]).sum()) - _FLOOR - 1e-6  # the tip's radius
 
-    touches.terminal = True  # type: ignore[attr-defined]
-    found = solve_ivp(rate, (0.0, 0.1), start, "DOP853", events=touches, dense_output=True, rtol=1e-12, atol=1e-14)
-    return float(found.t_events[0][0]), lambda time: np.asarray(found.sol(time)[:2])
+    end, motion = _until(touches, rate, start, 1e-12, 1e-14)
+    return end, lambda time: np.asarray(motion(time)[:2])
+
+
+def _until(event: Any, rate: Any, start: Any, rtol: float, atol: float) -> tuple[float, Callable[[Any], Any]]:
+    """Return the time of the event [s] and the motion until then."""
+    from scipy.integrate import solve_ivp
+
+    event.terminal = True
+    found = solve_ivp(rate, (0.0, 0.1), start, "DOP853", events=event, dense_output=True, rtol=rtol, atol=atol)
+    return float(found.t_events[0][0]), found.sol
 
 
 # --- a block pushed along the floor ---------------------------------------------------------------------------
@@ -133,17 +106,6 @@ _MU, _DURATION, _CREEP = 0.3, 0.2, 1e-3  # friction, [s], v_threshold of (6) [m/
 _KEPT = 1e-6
 # First-order error of a rigid step with Coulomb's law: half a step of the duration changes the distance by 6e-4.
 _FIRST_ORDER = 0.01
-
-
-def sticking_threshold() -> TrajectoryCase:
-    """A block on the floor, pushed with 0.99 μ m g."""
-    return _pushed(0.99, "Sticking, 1 % below the threshold", "it sticks; (6) would creep at 0.99 v_threshold for ever")
-
-
-def sliding_threshold() -> TrajectoryCase:
-    """A block on the floor, pushed with 1.01 μ m g."""
-    expected = "it slides by ½ 0.01 μ g t²; (6) would run ahead by nearly v_threshold t"
-    return _pushed(1.01, "Sliding, 1 % above the threshold", expected)
 
 
 def creep_of_the_regularised_law() -> TrajectoryCase:
@@ -182,7 +144,8 @@ def _block(share: float, law: str = "coulomb") -> Scene:
                     hand=hand)  # fmt: skip
 
 
-def _pushed(share: float, name: str, expected: str) -> TrajectoryCase:
+def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
+    """A block on the floor, pushed with this share of μ m g."""
     slide = 0.5 * max(share - 1.0, 0.0) * _MU * _G * _DURATION**2
     scale = slide or _CREEP * _DURATION  # if the block sticks: the distance of a creep at v_threshold
 
@@ -228,8 +191,6 @@ def painleve_rod() -> TrajectoryCase:
 @cache
 def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float64]]]:
     """Return the time at which the slip stops [s] and its speed until then [m/s], for a rod on one spring."""
-    from scipy.integrate import solve_ivp
-
     def slip(state: NDArray[np.float64]) -> Any:
         return state[3] + 0.5 * np.sin(state[2]) * state[5]
 
@@ -242,10 +203,9 @@ def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float
     def stops(_: float, state: NDArray[np.float64]) -> float:
         return float(slip(state)) + _STOPPED_SLIP
 
-    stops.terminal = True  # type: ignore[attr-defined]
     start = [0.0, _HEIGHT, math.atan2(_SINE, _COSINE), -_SPEED, 0.0, 0.0]
-    found = solve_ivp(rate, (0.0, 0.1), start, "DOP853", events=stops, dense_output=True, rtol=1e-11, atol=1e-13)
-    return float(found.t_events[0][0]), lambda time: slip(found.sol(time))
+    end, motion = _until(stops, rate, start, 1e-11, 1e-13)
+    return end, lambda time: slip(motion(time))
 
 
 def _measure_rod(run: Run) -> Measured:

@@ -158,8 +158,7 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> HardC
     try:
         run = (run_in_world if world == COULOMB else simulate)(case.scene, world)
     except IapbError as error:
-        verdict = "refused" if isinstance(error, ValueError) else "failed"
-        return HardCaseVerdict(case.name, world, verdict, str(error), exact_rank=None)
+        return HardCaseVerdict(case.name, world, _verdict_of(error), str(error), exact_rank=None)
     found, residual = case.measure(run), restitution_residual(run)
     verdict, fault = "stable", math.nan
     if not found.energy_gain <= found.energy_bound:
@@ -181,6 +180,10 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> HardC
         found.error, found.error_bound, int(run.impacts.rank.max(initial=0)), None,
         float(run.impacts.clamp.min(initial=1.0)), seconds, fault,
     )  # fmt: skip
+
+
+def _verdict_of(error: IapbError) -> str:
+    return getattr(error, "verdict", "refused" if isinstance(error, ValueError) else "failed")
 
 
 def faulty_motion(run: Run, fault: float) -> Run:
@@ -215,9 +218,13 @@ def restitution_residual(run: Run) -> float:
 class TimedOut(IapbError):
     """A call exceeded its time limit."""
 
+    verdict = "timed out"
+
 
 class OutOfMemory(IapbError):
     """A call exceeded its memory limit."""
+
+    verdict = "out of memory"
 
 
 class Answer(NamedTuple):
@@ -237,7 +244,7 @@ def judge_impact(case: HardCase, method: str) -> HardCaseVerdict:
     try:
         answer = _answer(case, method)
     except IapbError as error:
-        return HardCaseVerdict(case.name, method, _word(error), str(error), energy_bound=energy_bound,
+        return HardCaseVerdict(case.name, method, _verdict_of(error), str(error), energy_bound=energy_bound,
                                forward_bound=forward_bound, exact_rank=truth.rank)  # fmt: skip
 
     def measured(v_plus: Floats) -> tuple[str, float, float, float]:
@@ -284,12 +291,6 @@ def faulty_answers(case: HardCase, v_plus: Floats) -> list[Floats]:
     return ([change] if change.any() else []) + ([] if stopped else [v_plus])
 
 
-def _word(error: IapbError) -> str:
-    """Return the verdict for an error."""
-    words = {TimedOut: "timed out", OutOfMemory: "out of memory"}
-    return words.get(type(error), "refused" if isinstance(error, ValueError) else "failed")
-
-
 def _answer(case: HardCase, method: str) -> Answer:
     """Return an answer with the median time of a few calls."""
     if len(case.contact_jacobian) >= _MANY_CONTACTS and method in _FORM_DELASSUS:
@@ -302,33 +303,24 @@ def _answer(case: HardCase, method: str) -> Answer:
 
 
 def resolve_once(case: HardCase, method: str) -> Answer:
-    """Resolve and time one impact."""
+    """Resolve and time one impact; with friction by the engine's law, or by Newton's and Coulomb's laws alone."""
     given = case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution
-    if isinstance(case, FrictionalCase):
-        return _resolve_friction(case, method)
-
-    started = time.perf_counter()
-    if method in COMPARED:
+    rank: int | None
+    started, rank, clamp = time.perf_counter(), None, np.nan
+    if isinstance(case, FrictionalCase) and method == NEWTON_COULOMB:
+        velocity, rank = np.array([float(x) for x in case.newton_with_coulomb()]), 1
+    elif isinstance(case, FrictionalCase):
+        rubbed = resolve_frictional_impact(*given[:2], case.tangent, case.velocity, float(given[3]), case.friction)
+        velocity, rank, clamp = rubbed.velocity, 1, rubbed.clamp
+    elif method in COMPARED:
         velocity = COMPARED[method](*given)
-        seconds = time.perf_counter() - started
-        if not np.isfinite(velocity).all():
-            raise RangeError("velocity", f"{method} works on the numbers as given")
-        return Answer(velocity, None, np.nan, seconds)
-    impact = resolve_impact(*given, clamp=None if method == "factored" else False)
-    return Answer(impact.velocity, impact.rank, impact.clamp, time.perf_counter() - started)
-
-
-def _resolve_friction(case: FrictionalCase, method: str) -> Answer:
-    """Resolve by the engine's law with friction, or by Newton's and Coulomb's laws without its reduction."""
-    started = time.perf_counter()
-    if method == NEWTON_COULOMB:
-        v_plus, clamp = np.array([float(x) for x in case.newton_with_coulomb()]), np.nan
     else:
-        found = resolve_frictional_impact(
-            case.mass_matrix, case.contact_jacobian, case.tangent, case.velocity, float(case.restitution), case.friction
-        )
-        v_plus, clamp = found.velocity, found.clamp
-    return Answer(v_plus, 1, clamp, time.perf_counter() - started)
+        impact = resolve_impact(*given, clamp=None if method == "factored" else False)
+        velocity, rank, clamp = impact.velocity, impact.rank, impact.clamp
+    seconds = time.perf_counter() - started
+    if method in COMPARED and not np.isfinite(velocity).all():
+        raise RangeError("velocity", f"{method} works on the numbers as given")
+    return Answer(velocity, rank, clamp, seconds)
 
 
 @cache

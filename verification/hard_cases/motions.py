@@ -70,24 +70,10 @@ _BOUND = 2.0 * _PHYSICAL_DAMPING * 512.0  # K [N/m] with B = 0
 _SAME_NUMBERS = 1e-6
 
 
-def wall_at_the_bound() -> TrajectoryCase:
-    """A wall of stiffness K = 2 b / T, exactly at the bound."""
-    return _wall(1, "the largest stiffness for which passivity is proved", "in no world does the wall give energy")
-
-
-def wall_beyond_the_bound() -> TrajectoryCase:
-    """A wall of 500 times the stiffness 2 b / T."""
-    return _wall(500, "a penalty wall throws the handle back faster than it arrived",
-                 "an impulse stops the handle before the spring is compressed: the wall gives no energy")  # fmt: skip
-
-
-def wall_far_beyond_the_bound() -> TrajectoryCase:
-    """A wall of 2000 times the stiffness 2 b / T: T² K / m = 1.95, half of the value at which the step diverges."""
-    return _wall(2000, "only the spring acts while the contact lasts, and one time step is as long as a bounce",
-                 "impulses do not make a spring this stiff passive; only the rigid wall is")  # fmt: skip
-
-
-def _wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
+def wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
+    """A wall of `factor` times the stiffness K = 2 b / T of the bound; at 2000 times, T² K / m = 1.95, half of the
+    value at which the step diverges.
+    """
     values = {"contact.stiffness": factor * _BOUND, "contact.damping": 0.0, "duration": 3.0}
     name = "Stiff wall at the Colgate bound" if factor == 1 else f"Stiff wall, {factor:,} times the Colgate bound"
 
@@ -164,32 +150,13 @@ _CRADLE_STIFFNESS = 1e4
 _BY_SPRINGS = 2.0 * _CRADLE_STIFFNESS * 1e-6
 
 
-def touching_cradle() -> TrajectoryCase:
-    """A cradle with gaps of exactly 0: the contacts exist before the impact and carry no force.
+def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
+    """A cradle whose balls are a gap apart; radii of whole centimetres leave gaps of a few 1e-18 m of either sign.
 
-    A contact counts as new until it overlaps, so these contacts collide like those with a gap of one micrometre. If
-    they counted as old, springs would transmit the impact. Springs that are sampled once per step gain up to
-    2 K Δt²/m, which is 0.21 % here, as the world PB shows.
+    A contact counts as new until it overlaps, so contacts with a gap of exactly 0 collide like those with a gap of one
+    micrometre. If they counted as old, springs would transmit the impact. Springs that are sampled once per step gain
+    up to 2 K Δt²/m, which is 0.21 % here, as the world PB shows.
     """
-    return _cradle(0.0, "touching exactly")
-
-
-def touching_cradle_in_centimetres() -> TrajectoryCase:
-    """A cradle with gaps of a few 1e-18 m of either sign, from the rounding of 0.02, 0.04 and 0.06 m."""
-    return _cradle(0.0, "touching but for rounding", 0.01)
-
-
-def cradle_a_micrometre_apart() -> TrajectoryCase:
-    """A cradle with gaps of 1e-6 m: the balls collide one after another."""
-    return _cradle(1e-6, "a micrometre apart")
-
-
-def cradle_a_micrometre_sunk() -> TrajectoryCase:
-    """A cradle with overlaps of 1e-6 m: the springs push before the impact."""
-    return _cradle(-1e-6, "sunk by a micrometre")
-
-
-def _cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
     places = [-0.021875 - 2.0 * radius] + [k * (2.0 * radius + gap) for k in range(4)]
     balls = [{"name": f"ball_{k}", "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "position": [x],
               "velocity": [float(k == 0)], "shapes": [{"kind": "circle", "radius": radius}]}

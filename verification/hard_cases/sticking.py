@@ -18,7 +18,7 @@ from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, larg
 _G, _MU = 9.81, 0.5
 _ENGINE = ("IAPB", "PB", "IAPB-friction")
 # Width and height [m], stiffness [N/m]. The slabs of a stack oscillate on their springs without slipping.
-_BOX, _SLAB = (0.15, 0.05, 1e4), (0.3, 0.02, 5e4)
+BOX, SLAB = (0.15, 0.05, 1e4), (0.3, 0.02, 5e4)
 _LONG = 10.0  # [s]
 _SECOND_ORDER = 0.02  # relative error of the lean per box: the contact point lies at half the overlap
 
@@ -56,21 +56,12 @@ def nudged_box() -> TrajectoryCase:
         "a friction force that is held over a step reverses the motion and drives the box across the floor",
         "it stops where Coulomb's law predicts and stays there",
         f"Coulomb's law in closed form: v²/(2 μ g) = {1e3 * way:.4g} mm",
-        _boxes("nudged_box", "A nudged box", 1, _BOX, 0.0, speed), measure, _ENGINE,
+        _boxes("nudged_box", "A nudged box", 1, BOX, 0.0, speed), measure, _ENGINE,
     )  # fmt: skip
 
 
-def box_on_a_slope() -> TrajectoryCase:
-    """One box on a slope of 20 degrees, for ten seconds."""
-    return _sticking("Box that sticks on a slope", "box_on_a_slope", 1, _BOX)
-
-
-def stack_on_a_slope() -> TrajectoryCase:
-    """Three slabs on one another on a slope of 20 degrees, for ten seconds."""
-    return _sticking("Stack that sticks on a slope", "stack_on_a_slope", 3, _SLAB)
-
-
-def _sticking(title: str, name: str, count: int, sort: tuple[float, float, float]) -> TrajectoryCase:
+def on_a_slope(title: str, name: str, count: int, sort: tuple[float, float, float]) -> TrajectoryCase:
+    """Boxes on one another on a slope of 20 degrees, for ten seconds."""
     slope = math.radians(20.0)
     leans = _lean(count, sort, slope)
 

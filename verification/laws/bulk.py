@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb import resolve_impacts
 from iapb.advice.certificate import judge_gains
@@ -24,12 +23,12 @@ from iapb.linalg import cholesky
 from iapb.schema import zeros_of
 from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
-from verification.impacts import ANY_RANK, Impacts, draw_impacts
+from verification.impacts import ANY_RANK, Floats, Impacts, draw_impacts
 from verification.laws.bounds import EPS, over
 from verification.methods import COMPARED
+from verification.table import HOLDS, Row
 
-Floats = NDArray[Any]
-
+GAIN, SHARE, ABOVE = "largest relative energy gain", "gain / (10 d ε √κ)", "above 10 d ε √κ"
 LARGEST_COORDINATES, LARGEST_CONTACTS, _SIZED = 30, 100, 50  # _SIZED impacts share d, c and the kind of rows
 
 
@@ -69,27 +68,16 @@ class BulkImpacts:
         """d·ε·κ(M): bound of the gain from a Cholesky factor without the clamp."""
         return self.coordinates * EPS * self.condition
 
-    @property
-    def worst_ratio(self) -> float:
-        """Largest gain / bound; the bound holds if this is at most 1."""
-        return float(np.max(self.gain / self.bound))
-
-    @property
-    def above_bound(self) -> int:
-        """Number of impacts whose gain exceeds the bound."""
-        return int(np.sum(self.gain > self.bound))
-
-    def by_condition(self) -> Iterator[tuple[str, int, float, float, float, int, float]]:
-        """Yield one row per decade of κ(M), and one for all: κ from, impacts, and the largest gain, gain / bound,
-        gain / Cholesky's bound, impacts above the bound, and the largest residual.
-        """
+    def by_condition(self) -> Iterator[Row]:
+        """Yield the row of each decade of κ(M), and that of all impacts."""
         decade = np.floor(np.log10(self.condition) + 1e-9).astype(int)
         groups = [(f"1e{k}", decade == k) for k in np.unique(decade)]
         for name, chosen in [*groups, ("all", np.ones(len(decade), bool))]:
             ratio, gains = (self.gain / self.bound)[chosen], self.gain[chosen]
-            yield (name, int(np.sum(chosen)), float(np.max(gains)), float(np.max(ratio)),
-                   float(np.max(gains / self.cholesky_bound[chosen])), int(np.sum(ratio > 1.0)),
-                   float(np.max(self.residual[chosen])))
+            yield {"condition of M from": name, "impacts": int(np.sum(chosen)), GAIN: float(np.max(gains)),
+                   SHARE: float(np.max(ratio)), "gain / (d ε κ)": float(np.max(gains / self.cholesky_bound[chosen])),
+                   ABOVE: int(np.sum(ratio > 1.0)),
+                   "largest restitution residual": float(np.max(self.residual[chosen]))}
 
 
 def bulk_impacts(
@@ -110,33 +98,29 @@ def bulk_impacts(
     Returns
     -------
     BulkImpacts
-        one value per impact: sizes, κ(M), relative energy gain, its bound, and more.
+        Energy gain, restitution error and size of every impact.
     """
-    rng, columns, seconds = np.random.default_rng(seed), dict[str, list[Floats]](), 0.0
+    rng, seconds, batches = np.random.default_rng(seed), 0.0, list[dict[str, Floats]]()
     with one_thread():
         for start in range(0, impacts, _SIZED):
             n, d = min(_SIZED, impacts - start), int(rng.integers(1, LARGEST_COORDINATES + 1))
             given = draw_impacts(rng, ANY_RANK, n, d, int(rng.integers(0, LARGEST_CONTACTS + 1)))
-            started = time.perf_counter()
-            v_plus, rank = _resolve(given, method, clamp)
+            rows, started = given.columns.transpose(0, 2, 1), time.perf_counter()
+            if method == "factored":
+                found = resolve_impacts(given.mass, rows, given.v, given.restitution, clamp=clamp)
+                v_plus, rank = found.velocity, found.rank
+            else:
+                each = zip(given.mass, rows, given.v, given.restitution, strict=True)
+                v_plus, rank = np.array([COMPARED[method](*impact) for impact in each]), np.full(n, np.nan)
             seconds += time.perf_counter() - started
-            for name, values in _measure(given, v_plus, rank).items():
-                columns.setdefault(name, []).append(values)
+            batches.append(_measure(given, v_plus) | {"rank": rank})
             if progress is not None:
                 progress(start + n, impacts)
-    return BulkImpacts(method, clamp, seed, seconds, **{name: np.concatenate(x) for name, x in columns.items()})
+    columns = {name: np.concatenate([batch[name] for batch in batches]) for name in batches[0]}
+    return BulkImpacts(method, clamp, seed, seconds, **columns)
 
 
-def _resolve(given: Impacts, method: str, clamp: bool | None) -> tuple[Floats, Floats]:
-    rows = given.columns.transpose(0, 2, 1)
-    if method == "factored":
-        found = resolve_impacts(given.mass, rows, given.v, given.restitution, clamp=clamp)
-        return found.velocity, found.rank
-    v_plus = np.array([COMPARED[method](*impact) for impact in zip(given.mass, rows, *given[2:4], strict=True)])
-    return v_plus, np.full(len(v_plus), np.nan)
-
-
-def _measure(given: Impacts, v_plus: Floats, rank: Floats) -> dict[str, Floats]:
+def _measure(given: Impacts, v_plus: Floats) -> dict[str, Floats]:
     (n, d, c), lower = given.columns.shape, np.linalg.cholesky(given.mass)
     gains, error = bulk_energy_gain(given.mass, given.v, v_plus)
     target = v_plus + given.restitution[:, None] * given.v
@@ -144,7 +128,7 @@ def _measure(given: Impacts, v_plus: Floats, rank: Floats) -> dict[str, Floats]:
     speed = np.linalg.norm(np.einsum("nij,ni->nj", lower, given.v), axis=1)
     unmet = over(np.abs(np.einsum("nic,ni->nc", given.columns, target)), length * speed[:, None])
     return {
-        "coordinates": np.full(n, d), "contacts": np.full(n, c), "rank": rank, "condition": given.condition,
+        "coordinates": np.full(n, d), "contacts": np.full(n, c), "condition": given.condition,
         "restitution": given.restitution, "gain": gains, "gain_error": error,
         "residual": np.max(unmet, axis=1, initial=0.0),
     }
@@ -156,35 +140,13 @@ SCALED = ("600 decades",)  # scaled as in `resolve_impact`; the other families s
 _BATCH = 5000
 
 
-@dataclass(frozen=True)
-class ExactEnergy:
-    """Result for the impacts of one family.
+def exact_energy(family: str, impacts: int, seed: int = 0) -> Row:
+    """Draw and resolve the impacts of one of `impacts.ADVERSE_FAMILIES`, and check each for an energy gain.
 
-    Attributes
-    ----------
-    family : name of the family.
-    impacts, gains : number of impacts, and number of those that gained energy in exact arithmetic.
-    moved : share of the impacts with v⁺ ≠ v⁻.
-    cancelled : number of impacts without any passive step, for which v⁺ = v⁻.
-    price : 0.5, 0.99 and 1-quantiles, over the impacts with e = 1, of the relative energy that passivity costs. The
-        cost is the loss beyond that of the same impact without clamp and last step, in units of 10 d ε √κ(M).
+    The row has the number of impacts and of gains in exact arithmetic, the share that moved (v⁺ ≠ v⁻), the number that
+    was cancelled (no passive step, so v⁺ = v⁻), and the median and largest relative energy that passivity costs at
+    e = 1: the loss beyond that of the same impact without clamp and last step, in units of 10 d ε √κ(M).
     """
-
-    family: str
-    impacts: int
-    gains: int
-    moved: float
-    cancelled: int
-    price: tuple[float, float, float]
-
-    @property
-    def holds(self) -> bool | None:
-        """Whether no impact gained energy; None if too few impacts changed v for a conclusion."""
-        return False if self.gains else True if self.moved >= LEAST_MOVED else None
-
-
-def exact_energy(family: str, impacts: int, seed: int = 0) -> ExactEnergy:
-    """Draw and resolve the impacts of one of `impacts.ADVERSE_FAMILIES`, and check each for an energy gain."""
     rng, gains, moved, cancelled = np.random.default_rng([seed, *family.encode()]), 0, 0, 0
     prices: list[Any] = []
     for start in range(0, impacts, _BATCH):
@@ -197,8 +159,10 @@ def exact_energy(family: str, impacts: int, seed: int = 0) -> ExactEnergy:
         cancelled += int((clamps <= 0.0).sum())
         if family not in ("subnormal velocities", "600 decades"):
             prices.append(_losses(given, v_plus) - np.maximum(_losses(given, resolved(given, False)[0]), 0.0))
-    median, most, largest = np.quantile(np.concatenate(prices), (0.5, 0.99, 1.0)) if prices else np.full(3, np.nan)
-    return ExactEnergy(family, impacts, gains, moved / impacts, cancelled, (float(median), float(most), float(largest)))
+    median, largest = np.quantile(np.concatenate(prices), (0.5, 1.0)).tolist() if prices else (None, None)
+    holds = False if gains else True if moved / impacts >= LEAST_MOVED else None
+    return {"family": family, "impacts": impacts, "gains": gains, "moved": moved / impacts, "cancelled": cancelled,
+            "median energy cost": median, "largest energy cost": largest, HOLDS: holds}
 
 
 def resolved(given: Impacts, clamped: bool = True, *, scale: bool = False) -> tuple[Floats, Floats]:

@@ -18,11 +18,10 @@ an energetic coefficient) choose the laws with ``laws=``: all laws except `OF_RE
 hold for any contacts that only push.
 
 Coulomb's law with e > 0 may gain energy (Kane and Levinson 1985); ``kinetic_energy`` detects this gain. The laws for
-tangents use e = 0, for which all forms of Coulomb's law agree. ``sticking`` and ``friction_opposes`` check one contact;
-``maximal_dissipation`` checks all contacts together if their rows are independent. The convex relaxation (Anitescu and
-Tasora 2010) gives impulses to contacts that separate while they slide, and breaks ``separating``. A friction pyramid
-inside the cone keeps ``cone`` and, with two tangents, breaks ``maximal_dissipation``; a pyramid around it breaks
-``cone``.
+tangents use e = 0, for which all forms of Coulomb's law agree; they check one contact, and ``maximal_dissipation`` all
+contacts together if their rows are independent. The convex relaxation (Anitescu and Tasora 2010) gives impulses to
+contacts that separate while they slide, and breaks ``separating``. A friction pyramid inside the cone breaks, with two
+tangents, ``maximal_dissipation``; one around it breaks ``cone``.
 """
 
 from __future__ import annotations
@@ -97,8 +96,9 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     along the friction found, and one in the direction that reduces the remainder most. Every p found lies inside the
     cones, so the distance is never too small. If the target lies in the cones, the distance found is 1e-8 or less.
     """
-    tangents, friction = _friction(case)
-    m = tangents.shape[1]
+    m = 0 if case.tangents is None else case.tangents.shape[1]
+    tangents = case.with_tangents.rows[case.contacts :].reshape(case.contacts, m, case.coordinates)  # T L⁻ᵀ
+    friction = np.zeros(case.contacts) if case.friction is None else case.friction
     fixed = np.repeat(np.vstack([np.zeros((1, m)), np.eye(m), -np.eye(m)])[None], case.contacts, axis=0)
     directions, distance = fixed, np.inf
     for _ in range(_REFINEMENTS if m > 1 else 1):  # directions (c, k, m): k rays of each contact
@@ -113,14 +113,6 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
         more = np.divide(more, size, out=np.zeros_like(more), where=size > 0.0)
         directions = np.concatenate([fixed, more], axis=1)
     return distance
-
-
-def _friction(case: ImpactCase) -> tuple[Floats, Floats]:
-    """T L⁻ᵀ (c, m, d) and μ (c,); without friction m = 0."""
-    if case.tangents is None or case.friction is None:
-        return np.zeros((case.contacts, 0, case.coordinates)), np.zeros(case.contacts)
-    flat = case.tangents.reshape(-1, case.coordinates)
-    return np.linalg.solve(case.lower, flat.T).T.reshape(case.tangents.shape), case.friction
 
 
 @law(UNILATERAL_LAWS, "no_penetration", "γ⁺ ≥ min(0, −e γ⁻): no contact is left approaching")
@@ -214,12 +206,6 @@ def _single(case: ImpactCase) -> _Tried | None:
     return None if _normal_velocities(alone, case.velocity)[0] > -CLEAR else _tried(alone)
 
 
-def _together(case: ImpactCase) -> _Tried | None:
-    """All contacts with e = 0; None if there are fewer than two or their rows are too close to dependent."""
-    several = case.tangents is not None and case.contacts > 1 and case.speed > 0.0
-    return _tried(replace(case, restitution=0.0)) if several else None
-
-
 @law(FRICTIONAL_LAWS, "sticking", "one contact, e = 0: it sticks where Coulomb's law leaves no other answer")
 def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """|v_t⁺| / (‖A_t‖ |u|) of one contact with e = 0, if p = −W⁻¹γ⁻ lies so far inside the cone that p is unique.
@@ -257,7 +243,8 @@ def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds
     The law checks all contacts together if their rows determine every impulse, else the first contact alone. It skips
     contacts that pull; ``cone`` detects those.
     """
-    tried = _together(case) or _single(case)
+    several = case.tangents is not None and case.contacts > 1 and case.speed > 0.0
+    tried = (_tried(replace(case, restitution=0.0)) if several else None) or _single(case)
     if tried is None:
         return None
     power, limit = _friction_power(tried, resolver)

@@ -13,31 +13,11 @@ import numpy as np
 from verification.impacts import Floats, ImpactCase
 from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS
-from verification.laws.engine import ENGINE_LAWS, budgets, with_budget
+from verification.laws.engine import ENGINE_LAWS, budgets
 from verification.laws.resolver import Resolver, ResolverFault, outcome, own_outcome
-from verification.laws.strategies import SEARCHED, tangents_are_independent
+from verification.laws.strategies import tangents_are_independent
 
 _DIGITS = (0, 1, 2, 4, 8)
-
-
-def search_counterexample(
-    fails: Callable[[ImpactCase], bool], examples: int, seed: int, kind: str = "equality"
-) -> ImpactCase | None:
-    """Let hypothesis search impacts of small integers and shrink the first failure; None if it finds none.
-
-    kind : key of `strategies.SEARCHED`: a contract or ``unequal``
-    """
-    import random
-
-    from hypothesis import HealthCheck, Phase, find, settings
-    from hypothesis.errors import NoSuchExample
-
-    profile = settings(max_examples=examples, database=None, deadline=None, phases=(Phase.generate, Phase.shrink),
-                       suppress_health_check=list(HealthCheck))
-    try:
-        return find(SEARCHED[kind](), fails, settings=profile, random=random.Random(seed))
-    except NoSuchExample:
-        return None
 
 
 def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
@@ -60,23 +40,23 @@ def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
     if case.translations is not None:
         yield replace(case, translations=None)
     for i in range(case.contacts):
-        fewer: dict[str, Any] = {}
-        for name in ("contact_jacobian", "tangents", "friction", "unequal"):
-            array = getattr(case, name)
-            fewer[name] = None if array is None else np.delete(array, i, axis=0)
-        yield replace(case, **fewer)
+        yield _without(case, ("contact_jacobian", "tangents", "friction", "unequal"), i, 0)
     if case.coordinates > 1 and case.translations is None:
         for k in range(case.coordinates):
-            mass, tangents = np.delete(case.mass_matrix, k, axis=0), case.tangents
-            yield replace(case, mass_matrix=np.delete(mass, k, axis=1), velocity=np.delete(case.velocity, k),
-                          contact_jacobian=np.delete(case.contact_jacobian, k, axis=1),
-                          tangents=None if tangents is None else np.delete(tangents, k, axis=2))
+            fewer = _without(case, ("velocity", "contact_jacobian", "tangents", "mass_matrix"), k, -1)
+            yield _without(fewer, ("mass_matrix",), k, 0)
     for e in (1.0, 0.0):
         if case.unequal is None and case.restitution not in (1.0, e):
             yield replace(case, restitution=e)
     for digits in _DIGITS:
         for name in ("velocity", "contact_jacobian", "tangents", "mass_matrix", "friction", "unequal"):
             yield from _rounded(case, name, digits)
+
+
+def _without(case: ImpactCase, names: tuple[str, ...], index: int, axis: int) -> ImpactCase:
+    """The case without this entry of the named arrays along an axis."""
+    arrays = {name: getattr(case, name) for name in names}
+    return replace(case, **{name: np.delete(array, index, axis) for name, array in arrays.items() if array is not None})
 
 
 def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
@@ -191,15 +171,13 @@ def strike(part: str, case: Any, resolver: Resolver) -> Struck | None:
     """
     if not isinstance(case, ImpactCase):
         return None
-    calls = {case.contacts: partial(own_outcome, resolver)}
-    if part == "truncation":
-        calls = {rows: partial(outcome, with_budget(ENGINE_LAWS[part].ours, rows)) for rows in budgets(case)}
-    elif part in ENGINE_LAWS:
-        calls = {case.contacts: partial(outcome, ENGINE_LAWS[part].ours)}
-    after, complaints = np.full((len(calls), case.coordinates), np.nan), []
-    for velocity, call in zip(after, calls.values(), strict=True):
+    subject = ENGINE_LAWS[part].ours if part in ENGINE_LAWS else resolver
+    rows = tuple(budgets(case)) if part == "truncation" else (case.contacts,)
+    after, complaints = np.full((len(rows), case.coordinates), np.nan), []
+    for velocity, budget in zip(after, rows, strict=True):
         try:
-            velocity[:] = call(case)
+            velocity[:] = (outcome(partial(subject, budget=budget), case) if part == "truncation"
+                           else own_outcome(subject, case))  # fmt: skip
         except ResolverFault as fault:
             complaints.append(str(fault))
-    return Struck(case, tuple(calls), after, "; ".join(complaints))
+    return Struck(case, rows, after, "; ".join(complaints))

@@ -33,24 +33,14 @@ from verification.stability.device_port import (
 
 
 # Anytime property: every truncation of the projector is passive, so a row budget never costs passivity.
-def in_budget(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Any:
-    """Call the engine's resolver; it stops after `budget` rows."""
-    return resolve_impact(M, J, v, e, budget=budget)
-
-
 def budgets(case: ImpactCase) -> range:
     """All budgets that may differ."""
     return range(min(case.contacts, case.coordinates) + 1)
 
 
-def with_budget(subject: Callable[..., Any], budget: int) -> Resolver:
-    """Return the resolver (M, J, v, e) of a subject (M, J, v, e, budget)."""
-    return lambda *impact: subject(*impact, budget)
-
-
 def every_budget_is_passive(case: ImpactCase, subject: Callable[..., Any]) -> LawResidual:
     """Largest relative energy gain over all budgets; infinite if a budget of 0 rows still gives an impulse."""
-    answers = [outcome(with_budget(subject, budget), case) for budget in budgets(case)]
+    answers = [outcome(partial(subject, budget=budget), case) for budget in budgets(case)]
     worst = max(relative_gain(case.mass_matrix, case.velocity, v_plus) for v_plus in answers)
     idle = np.array_equal(answers[0], case.velocity)
     return LawResidual("truncation", worst if idle else np.inf, FACTORED.energy_gain(case))
@@ -326,7 +316,7 @@ class EngineLaw(NamedTuple):
 ENGINE_LAWS: dict[str, EngineLaw] = {
     "truncation": EngineLaw(
         "a result cut short at any number of rows is passive, and none is no impulse",
-        partial(draw_case, largest_condition=1e12), every_budget_is_passive, in_budget),
+        partial(draw_case, largest_condition=1e12), every_budget_is_passive, resolve_impact),
     "device_limits": EngineLaw(
         "an impulse cut to the device's limits by one factor per group is passive for tool and device",
         draw_limited, limited_impulses_are_passive, scaled),

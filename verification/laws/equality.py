@@ -26,10 +26,6 @@ def _varied(case: ImpactCase, mass: Floats, rows: Floats, velocity: Floats) -> I
     return replace(case, mass_matrix=mass, contact_jacobian=rows, velocity=velocity, translations=None)
 
 
-def _with_rows(case: ImpactCase, rows: Floats) -> ImpactCase:
-    return replace(case, contact_jacobian=rows)
-
-
 @law(LAWS, "kinetic_energy", "KE⁺ ≤ KE⁻")
 def kinetic_energy_never_rises(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """Theorems 1 and 2, for every e in [−1, 1]; the tolerance is the gain that rounding can cause."""
@@ -124,7 +120,7 @@ def redundant_equals_reduced(case: ImpactCase, resolver: Resolver, bounds: Bound
     from scipy.linalg import qr
 
     chosen = qr(case.unit_rows.T, mode="r", pivoting=True)[1][:rank]
-    reduced = _with_rows(case, case.contact_jacobian[sorted(chosen)])
+    reduced = replace(case, contact_jacobian=case.contact_jacobian[sorted(chosen)])
     tolerance = max(bounds.comparison(case), bounds.comparison(reduced))
     return case.distance(own_outcome(resolver, case), outcome(resolver, reduced)), tolerance
 
@@ -135,7 +131,7 @@ def duplicated_rows_change_nothing(case: ImpactCase, resolver: Resolver, bounds:
     if not case.is_separated or case.contacts == 0:
         return None
     copies = case.contact_jacobian[: (case.contacts + 1) // 2]
-    doubled = _with_rows(case, np.vstack([case.contact_jacobian, copies, copies[:1]]))
+    doubled = replace(case, contact_jacobian=np.vstack([case.contact_jacobian, copies, copies[:1]]))
     if not doubled.is_separated:
         return None
     return case.distance(own_outcome(resolver, case), outcome(resolver, doubled)), bounds.comparison(case)
@@ -146,7 +142,7 @@ def row_order_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     """Distance between the velocities with the rows as given and in reverse order."""
     if not case.is_separated or case.contacts < 2:
         return None
-    reversed_rows = _with_rows(case, case.contact_jacobian[::-1].copy())
+    reversed_rows = replace(case, contact_jacobian=case.contact_jacobian[::-1].copy())
     return case.distance(own_outcome(resolver, case), outcome(resolver, reversed_rows)), bounds.comparison(case)
 
 
@@ -160,7 +156,7 @@ def row_scale_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
         return None
     plain, rows = own_outcome(resolver, case), case.contact_jacobian
     by_powers, by_factors = (
-        outcome(resolver, _with_rows(case, rows * np.resize(factors, case.contacts)[:, None]))
+        outcome(resolver, replace(case, contact_jacobian=rows * np.resize(factors, case.contacts)[:, None]))
         for factors in (np.ldexp(1.0, _POWERS), _FACTORS)
     )
     worst = max(case.distance(plain, by_powers), case.distance(plain, by_factors))

@@ -25,9 +25,10 @@ from verification.impacts import (
 )
 from verification.laws.bounds import KIT, Bounds, Law, LawCount, LawResidual
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS, Contract
-from verification.laws.counterexample import as_test, name_of, search_counterexample, shrink
+from verification.laws.counterexample import as_test, name_of, shrink
 from verification.laws.equality import OF_ONE_CALL, UNEQUAL_LAWS
 from verification.laws.resolver import Resolver, ResolverFault, Watched, own_answer
+from verification.laws.strategies import search_counterexample
 
 NOTABLE = 1e-6  # the search prefers counterexamples with a residual above this, which rounding cannot explain
 IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
@@ -86,17 +87,18 @@ class LawVerdict(LawCount):
             return
         if residual is None:
             return
-        before = self.worst
         passed = self.add(residual)
-        if self.worst is not before:
+        if self.worst is residual:
             self.worst_case = case
         self.severe += residual.severe
         self.fault = self.fault or complaint
         self.largest = max(self.largest, residual.value)
-        if not passed and (self.largest_case is None or residual.value > self._largest_failure):
+        if passed:
+            return
+        if self.largest_case is None or residual.value > self._largest_failure:
             self._largest_failure, self.largest_case = residual.value, case
-        size = residual.value < NOTABLE, _size(case)
-        if not passed and (self.smallest_case is None or size < self._smallest):
+        size = residual.value < NOTABLE, case.coordinates + case.contacts
+        if self.smallest_case is None or size < self._smallest:
             self._smallest, self.smallest_case = size, case
 
 
@@ -203,10 +205,6 @@ def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
         yield lead + text.replace("\n", "\n" + " " * len(lead))
 
 
-def _size(case: ImpactCase) -> int:
-    return case.coordinates + case.contacts
-
-
 def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
     """Return the law's residual and ""; if the answer is unusable, an infinite residual and the resolver's fault."""
     try:
@@ -279,13 +277,12 @@ def check_passivity(
     >>> def test_my_resolver():
     ...     check_passivity(my_resolver, contract="unilateral").raise_if_broken()
     """
-    ends, terms = time.monotonic() + patience, _contract(contract, unequal_restitution)
-    chosen = choose_laws(contract, laws, unequal_restitution)
-    if isinstance(impacts, bool) or not isinstance(impacts, int | np.integer) or impacts < 1:
-        raise ArgumentError("impacts", impacts, "a whole number, 1 or more")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ArgumentError("seed", seed, "a whole number, 0 or more")
+    ends, chosen = time.monotonic() + patience, choose_laws(contract, laws, unequal_restitution)
+    for name, count, least in (("impacts", impacts, 1), ("seed", seed, 0)):
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
+            raise ArgumentError(name, count, f"a whole number, {least} or more")
     _refuse_signature(resolver, contract)
+    terms = CONTRACTS[contract]
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
     trial = _Trial(resolver, bounds, terms, int(impacts), seed, condition, chosen,
@@ -301,14 +298,6 @@ def check_passivity(
     law = broken.law if broken else ""
     return PassivityReport(name_of(resolver), done, seed, verdicts, example, law, late, bounds, resolver, contract,
                            str(returned) if isinstance(returned, ResolverFault) else returned)
-
-
-def _contract(name: str, unequal_restitution: bool) -> Contract:
-    if name not in CONTRACTS:
-        raise ArgumentError("contract", name, one_of(name, CONTRACTS))
-    if unequal_restitution and name == "frictional":
-        raise ArgumentError("unequal_restitution", True, "False with contract 'frictional'")
-    return CONTRACTS[name]
 
 
 def _refuse_signature(resolver: Resolver, contract: str) -> None:
@@ -333,8 +322,11 @@ def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: 
     ArgumentError
         The contract has no law of that name; the message lists the laws that it has.
     """
-    terms = _contract(contract, unequal_restitution)
-    known = terms.laws | (UNEQUAL_LAWS if unequal_restitution else {})
+    if contract not in CONTRACTS:
+        raise ArgumentError("contract", contract, one_of(contract, CONTRACTS))
+    if unequal_restitution and contract == "frictional":
+        raise ArgumentError("unequal_restitution", True, "False with contract 'frictional'")
+    known = CONTRACTS[contract].laws | (UNEQUAL_LAWS if unequal_restitution else {})
     if laws is None:
         return {name: law for name, law in known.items() if name not in EXACT_LAWS}
     if not isinstance(laws, Iterable):
@@ -415,20 +407,18 @@ def _counterexample(
     law: Law, broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float, contract: str
 ) -> ImpactCase | None:
     """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk until the time limit."""
+
+    def breaks(case: ImpactCase, least: float) -> bool:
+        if time.monotonic() > ends:
+            return False
+        residual, _ = residual_of(law, case, resolver, bounds)
+        return residual is not None and not residual.passed and not residual.value < least
+
     kind = "unequal" if broken.law in UNEQUAL_LAWS else contract
     for least in (NOTABLE, 0.0):
-        fails = partial(_fails, law, resolver, bounds, least, ends)
+        fails = partial(breaks, least=least)
         found = search_counterexample(fails, search, seed, kind) if search and time.monotonic() < ends else None
         drawn = [case for case in (broken.smallest_case, broken.largest_case) if case is not None and fails(case)]
-        failing = drawn if found is None else [found, *drawn]
-        if failing:
-            return shrink(min(failing, key=_size), fails)
+        if failing := drawn if found is None else [found, *drawn]:
+            return shrink(min(failing, key=lambda case: case.coordinates + case.contacts), fails)
     return None
-
-
-def _fails(law: Law, resolver: Resolver, bounds: Bounds, least: float, ends: float, case: ImpactCase) -> bool:
-    """Whether the case breaks the law with a residual of at least `least`; False after the time limit."""
-    if time.monotonic() > ends:
-        return False
-    residual, _ = residual_of(law, case, resolver, bounds)
-    return residual is not None and not residual.passed and not residual.value < least

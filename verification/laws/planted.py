@@ -28,15 +28,16 @@ from verification.stability.device_port import DeviceLoop, actuator_forces
 
 
 class Fault(NamedTuple):
-    """A fault: its name, and how to make its resolver or subject."""
+    """A fault: its name, and its resolver or subject, or what makes one with a memory of its own."""
 
     name: str
-    make: Callable[[], Callable[..., Any]]
+    subject: Callable[..., Any]
+    remembers: bool = False
 
-
-def plain(name: str, subject: Callable[..., Any]) -> Fault:
-    """Return the fault of a subject without memory."""
-    return Fault(name, lambda: subject)
+    def make(self) -> Callable[..., Any]:
+        """Return the resolver or subject, with an empty memory."""
+        subject: Callable[..., Any] = self.subject() if self.remembers else self.subject
+        return subject
 
 
 # Faulty resolvers, made from the parts of the correct one.
@@ -120,26 +121,26 @@ def each_contact_its_own_restitution(M: Floats, J: Floats, v: Floats, e: Floats)
 
 
 PLANTED_BUGS: dict[str, Fault] = {
-    "kinetic_energy": plain("wrong_sign", wrong_sign),
-    "restitution": plain("squared_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + e * e)),
-    "free_motion": plain("too_tight_rank", lambda M, J, v, e: projecting(M, J, v, 1.0 + e, cut=1e-18)),
-    "impulse_range": plain("transposed_factor", transposed_factor),
+    "kinetic_energy": Fault("wrong_sign", wrong_sign),
+    "restitution": Fault("squared_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + e * e)),
+    "free_motion": Fault("too_tight_rank", lambda M, J, v, e: projecting(M, J, v, 1.0 + e, cut=1e-18)),
+    "impulse_range": Fault("transposed_factor", transposed_factor),
     # ignores the coupling between coordinates in M
-    "coordinates": plain("diagonal_mass", lambda M, J, v, e: projecting(np.diag(np.diag(M)), J, v, 1.0 + e)),
-    "row_order": plain("one_after_the_other", one_after_the_other),
-    "duplicated_rows": plain("double_counted", double_counted),
-    "momentum": plain("per_body_rows", per_body_rows),
-    "row_scaling": plain("unscaled_rows", unscaled_rows),
-    "no_impulse": plain("absolute_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + abs(e))),
+    "coordinates": Fault("diagonal_mass", lambda M, J, v, e: projecting(np.diag(np.diag(M)), J, v, 1.0 + e)),
+    "row_order": Fault("one_after_the_other", one_after_the_other),
+    "duplicated_rows": Fault("double_counted", double_counted),
+    "momentum": Fault("per_body_rows", per_body_rows),
+    "row_scaling": Fault("unscaled_rows", unscaled_rows),
+    "no_impulse": Fault("absolute_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + abs(e))),
     # 1e-4 less of the impulse than e requires
-    "elastic": plain("nearly_elastic", lambda M, J, v, e: projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))),
-    "redundancy": plain("one_gradient_step", one_gradient_step),
+    "elastic": Fault("nearly_elastic", lambda M, J, v, e: projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))),
+    "redundancy": Fault("one_gradient_step", one_gradient_step),
     # a fixed length depends on the units
-    "units": plain("short_rows_dropped",
+    "units": Fault("short_rows_dropped",
                    lambda M, J, v, e: sound_resolver(M, J[np.linalg.norm(J, axis=1) > 0.2], v, e)),
-    "groups": plain("three_rows_at_most", three_rows_at_most),
-    "repeatability": Fault("warm_start", makes_warm_start),
-    "arguments": plain("writes_on_its_arguments", writes_on_its_arguments),
+    "groups": Fault("three_rows_at_most", three_rows_at_most),
+    "repeatability": Fault("warm_start", makes_warm_start, remembers=True),
+    "arguments": Fault("writes_on_its_arguments", writes_on_its_arguments),
 }
 
 
@@ -174,12 +175,12 @@ def stiffer_coupler(loop: DeviceLoop, positions: Floats) -> Floats:
 
 
 PLANTED_ENGINE_FAULTS: dict[str, Fault] = {
-    "truncation": plain("rows not made orthogonal", not_orthogonal),
-    "device_limits": plain("saturation, component by component", saturated),
-    "group_splitting": plain("one factor for all groups", one_factor_for_all),
-    "hand_port": Fault("a wall one reading late", makes_late_wall),
-    "device_port": plain("a coupler stiffer than it says", stiffer_coupler),
-    "extremes": plain("plain numpy without checks", sound_resolver),
+    "truncation": Fault("rows not made orthogonal", not_orthogonal),
+    "device_limits": Fault("saturation, component by component", saturated),
+    "group_splitting": Fault("one factor for all groups", one_factor_for_all),
+    "hand_port": Fault("a wall one reading late", makes_late_wall, remembers=True),
+    "device_port": Fault("a coupler stiffer than it says", stiffer_coupler),
+    "extremes": Fault("plain numpy without checks", sound_resolver),
 }
 
 

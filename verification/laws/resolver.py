@@ -22,11 +22,10 @@ class Watched:
     """A resolver whose every answer is checked for energy, whichever law made the call.
 
     suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit checks them in double-double.
-    calls : number of calls.
     """
 
     def __init__(self, resolver: Resolver) -> None:
-        self.resolver, self.calls = resolver, 0
+        self.resolver = resolver
         self.suspects: list[tuple[ImpactCase, Floats]] = []
 
     def __call__(self, *given: Any) -> Any:
@@ -34,7 +33,6 @@ class Watched:
 
     def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
         """Add the answer to `suspects` if its kinetic energy exceeds that before the impact by more than SUSPICIOUS."""
-        self.calls += 1
         before = float(case.velocity @ (case.mass_matrix @ case.velocity))
         after = float(v_plus @ (case.mass_matrix @ v_plus))
         if not after <= before * (1.0 + SUSPICIOUS):

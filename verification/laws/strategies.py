@@ -1,12 +1,15 @@
-"""Hypothesis strategies: impacts of small integers and powers of ten, which shrink to readable counterexamples."""
+"""Search for counterexamples by hypothesis, among impacts of small integers and powers of ten: they shrink well."""
 
 from __future__ import annotations
 
+import random
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import assume
+from hypothesis import HealthCheck, Phase, assume, find, settings
 from hypothesis import strategies as st
+from hypothesis.errors import NoSuchExample
 
 from reference.exact import independent_rows
 from verification.impacts import Floats, ImpactCase, cradle_rows
@@ -106,3 +109,15 @@ def tangents_are_independent(case: ImpactCase) -> bool:
 # Strategies for the search of counterexamples: one per contract, and one with a restitution per row.
 SEARCHED = {"equality": impact_cases, "unequal": unequal_cases, "unilateral": one_sided_cases,
             "frictional": frictional_cases}
+
+
+def search_counterexample(
+    fails: Callable[[ImpactCase], bool], examples: int, seed: int, kind: str = "equality"
+) -> ImpactCase | None:
+    """Search impacts of a kind of SEARCHED and shrink the first failure; None if there is none."""
+    profile = settings(max_examples=examples, database=None, deadline=None, phases=(Phase.generate, Phase.shrink),
+                       suppress_health_check=list(HealthCheck))
+    try:
+        return find(SEARCHED[kind](), fails, settings=profile, random=random.Random(seed))
+    except NoSuchExample:
+        return None

@@ -8,7 +8,7 @@ are made by hand if that explains more.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,8 +28,9 @@ from verification.finding import (
     verdict_of_law,
 )
 from verification.impacts import ImpactCase
-from verification.laws import LAWS, PLANTED_BUGS, bulk_impacts, check_passivity
+from verification.laws import LAWS, PLANTED_BUGS, PassivityReport, bulk_impacts, check_passivity
 from verification.laws.bounds import LawCount, relative_gain
+from verification.laws.bulk import ABOVE, GAIN, SHARE
 from verification.laws.engine import (
     ENGINE_LAWS,
     judge_engine_law,
@@ -38,6 +39,7 @@ from verification.laws.engine import (
     saturation_counterexample,
     scaled,
 )
+from verification.laws.kit import LawVerdict
 from verification.laws.planted import (
     PLANTED_ENGINE_FAULTS,
     PLANTED_TRAJECTORY_FAULTS,
@@ -83,13 +85,8 @@ def _engine_law(study: Study, name: str) -> Row:
     return _row(ENGINE_LAWS[name].statement, count, fault.name, broken.failures > 0)
 
 
-class _Trajectories(NamedTuple):
-    scenes: list[SceneCase]
-    every: list[Trajectory]
-    whole: list[Trajectory]  # without those that do not stay finite
-
-
-def _trajectories(study: Study) -> _Trajectories:
+def _trajectories(study: Study) -> tuple[list[SceneCase], list[Trajectory], list[Trajectory]]:
+    """The random scenes, their trajectories, and those that stay finite."""
     rng = np.random.default_rng(SEED)
     scenes = [draw_scene(rng, TRAJECTORY_STEPS) for _ in range(TRAJECTORIES)]
     scenes += [draw_spatial_scene(rng, TRAJECTORY_STEPS) for _ in range(IN_SPACE)]
@@ -97,17 +94,16 @@ def _trajectories(study: Study) -> _Trajectories:
                    lambda case: f"trajectory of random scene {case[0]}")
     every, finite = list(runs), TRAJECTORY_LAWS["finite"]
     sound = attempt("finite", lambda: [(one, finite.check(one)) for one in every], []) or ()
-    return _Trajectories(scenes, every, [one for one, found in sound if found is None or found.passed] or every)
+    return scenes, every, [one for one, found in sound if found is None or found.passed] or every
 
 
 def _trajectory_law(study: Study, name: str) -> Row:
-    drawn = study.once("trajectories", lambda: _trajectories(study))
+    scenes, every, whole = study.once("trajectories", lambda: _trajectories(study))
     law, count = TRAJECTORY_LAWS[name], LawCount(name)
-    for one in drawn.every if name == "finite" else drawn.whole:
-        found = law.check(one)
-        if found is not None:
+    for one in every if name == "finite" else whole:
+        if (found := law.check(one)) is not None:
             count.add(found)
-    run = first_occasion(name, drawn.scenes)
+    run = first_occasion(name, scenes)
     residual = law.check(Trajectory(run)) if run is not None else None
     caught = residual is not None and not residual.passed
     return _row(f"along a trajectory: {law.statement}", count, PLANTED_TRAJECTORY_FAULTS[name].__name__, caught)
@@ -145,24 +141,22 @@ METHODS: dict[str, tuple[str, bool | None, dict[str, int]]] = {
     "factored": ("factored", None, IMPACTS), "factored, no clamp": ("factored", False, COMPARED_IMPACTS),
     "gram_pinv, as printed": ("gram_pinv", None, COMPARED_IMPACTS),
 }
-_GAIN, _SHARE, _ABOVE = "largest relative energy gain", "gain / (10 d ε √κ)", "above 10 d ε √κ"
-_BULK = ("condition of M from", "impacts", _GAIN, _SHARE, "gain / (d ε κ)", _ABOVE, "largest restitution residual")
 
 
 def _gains(study: Study, name: str) -> Iterator[Row]:
     method, clamp, impacts = METHODS[name]
     for row in bulk_impacts(impacts[study.depth], SEED, method, clamp).by_condition():
-        yield {"method": name, **dict(zip(_BULK, row, strict=True))}
+        yield {"method": name, **row}
 
 
 def _gains_say(table: Table) -> Iterator[Part]:
     totals = {row["method"]: row for row in table.where(**{"condition of M from": "all"}).records()}
     ours, printed = totals.get("factored"), totals.get("gram_pinv, as printed")
     if ours and printed:
-        most = " gains no energy" if ours[_GAIN] <= 0.0 else \
-            f"'s largest relative energy gain is {ours[_GAIN]:.1e}, {ours[_SHARE]:.2g} of its bound 10 d ε √κ(M)"
+        most = " gains no energy" if ours[GAIN] <= 0.0 else \
+            f"'s largest relative energy gain is {ours[GAIN]:.1e}, {ours[SHARE]:.2g} of its bound 10 d ε √κ(M)"
         yield Part(f"In {ours['impacts']:,} random impacts the engine{most}; the printed formula gains up to "
-                   f"{printed[_GAIN]:.1e}.", REPRODUCED if ours[_ABOVE] == 0 else REFUTED)
+                   f"{printed[GAIN]:.1e}.", REPRODUCED if ours[ABOVE] == 0 else REFUTED)
 
 
 energy_gains = Topic(
@@ -185,11 +179,8 @@ def counterexamples(progress: Progress, failures: list[Failure]) -> tuple[Findin
 
 def printed_formula() -> Finding:
     """Return the kit's counterexample to equations (20)-(21) as printed (`gram_pinv`), checked in exact rationals."""
-    report = check_passivity(gram_pinv, impacts=COUNTER_IMPACTS, search=SEARCH)
-    verdict, case = report.verdict("kinetic_energy"), report.counterexample
-    if case is None or report.counterexample_law != "kinetic_energy":
-        raise IapbError(f"in {COUNTER_IMPACTS} random impacts and the adverse ones the printed formula gains no energy")
-    answer, gain = _struck(gram_pinv, case, relative_energy_gain)
+    report, verdict, case, given = _found(gram_pinv, "kinetic_energy", impacts=COUNTER_IMPACTS)
+    gain = relative_energy_gain(case.mass_matrix, case.velocity, given["v⁺ as computed"])
     exact = exact_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).rounded_velocity
     sentence = (
         f"The formula as printed gains {gain:.2g} of the kinetic energy, in exact rationals, on {case.contacts} rows "
@@ -197,30 +188,30 @@ def printed_formula() -> Finding:
         f"case by itself; {verdict.failures} of its {verdict.checked} impacts gained energy, at most "
         f"{verdict.largest:.2g} of it."
     )
-    given = {**_arrays(case), "v⁺ as computed": answer, "v⁺ exact, rounded": exact}
-    return counterexample("gram_pinv", verdict.statement, sentence, given, report.counterexample_test)
+    return counterexample("gram_pinv", verdict.statement, sentence, given | {"v⁺ exact, rounded": exact},
+                          report.counterexample_test)
 
 
 def restitution_per_contact() -> Finding:
     """Return the counterexample to the obvious extension of (15): equalities with one restitution per row."""
-    resolver = each_contact_its_own_restitution
-    report = check_passivity(resolver, impacts=COUNTER_IMPACTS // 2, search=SEARCH, unequal_restitution=True)
-    verdict, case = report.verdict("unequal_kinetic_energy"), report.counterexample
-    if case is None:
-        raise IapbError("the kit found no impact in which restitution per contact gains energy")
-    answer, gain = _struck(resolver, case, relative_gain)
+    report, verdict, case, given = _found(each_contact_its_own_restitution, "unequal_kinetic_energy",
+                                          impacts=COUNTER_IMPACTS // 2, unequal_restitution=True)
+    gain = relative_gain(case.mass_matrix, case.velocity, given["v⁺ as computed"])
     sentence = (
         f"Equalities with one restitution per contact, J v⁺ = −E J v⁻, multiply the kinetic energy by "
         f"{1.0 + gain:.3g}. The passivity kit found and shrank this case. Where restitutions differ, the engine uses "
         "Poisson's law (two LCPs), which is passive."
     )
-    return counterexample("J v⁺ = −E J v⁻", verdict.statement, sentence,
-                          {**_arrays(case), "v⁺ as computed": answer}, report.counterexample_test)
+    return counterexample("J v⁺ = −E J v⁻", verdict.statement, sentence, given, report.counterexample_test)
 
 
-def _struck(resolver: Any, case: Any, gain: Callable[..., float]) -> tuple[Any, float]:
-    answer = resolver(*case.given())
-    return answer, gain(case.mass_matrix, case.velocity, answer)
+def _found(resolver: Any, law: str, **how: Any) -> tuple[PassivityReport, LawVerdict, ImpactCase, dict[str, Any]]:
+    """The kit's report on a resolver that breaks the law, its verdict, the counterexample, and that case by name."""
+    report = check_passivity(resolver, search=SEARCH, **how)
+    case = report.counterexample
+    if case is None or report.counterexample_law != law:
+        raise IapbError(f"in {how['impacts']} random impacts and the adverse ones the resolver breaks no law {law!r}")
+    return report, report.verdict(law), case, _arrays(case) | {"v⁺ as computed": resolver(*case.given())}
 
 
 def saturation() -> Finding:

@@ -12,15 +12,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.contact.laws import ENGINE_LAWS
 from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.system import System
+from reference import Floats
 from verification.laws.bounds import EPS, FACTORED, Found, Law, LawResidual, law, over, relative_gain
-
-Floats = NDArray[np.float64]
 
 TRAJECTORY_LAWS: dict[str, Law] = {}
 BY_THE_ENGINE = ("impulse-augmented penalty", "penalty")
@@ -78,7 +76,7 @@ class Trajectory:
         if system.mechanism.has_velocity_terms:
             out += system.mechanism.biases(q, self.v_struck)
         if np.any(system.gravity):
-            out += np.array([system.mechanism.gravity(at, system.gravity) for at in q])
+            out += [system.mechanism.gravity(at, system.gravity) for at in q]
         return out
 
     @property
@@ -194,19 +192,14 @@ def ledger_closes(trajectory: Trajectory) -> Found:
     masses = np.concatenate([trajectory.masses, system.mechanism.mass_matrix(run.q[-1])[None]])
     kinetic = 0.5 * np.einsum("ni,nij,nj->n", run.v, masses, run.v)
     size = float(np.max(kinetic) + np.max(np.abs(potential)) + sum(np.sum(np.abs(work)) for work in works.values()))
-    pairs = [(np.cumsum(works[name]), run.energy[f"{name}_work"]) for name in _FORCES]
-    pairs += [(kinetic, run.energy["kinetic"]), (potential, run.energy["potential"]),
-              (_impact_losses(trajectory), run.energy["impact_loss"]), _residuals(trajectory)]
-    wrong = max(float(np.max(np.abs(one - other), initial=0.0)) for one, other in pairs)
-    return wrong / max(size, TINY), 10.0 * len(run.time) * EPS
-
-
-def _impact_losses(trajectory: Trajectory) -> Floats:
-    """Energy lost in impacts up to each step (n,), recomputed from each impact's velocities before and after."""
-    impacts, losses = trajectory.run.impacts, np.zeros(trajectory.run.steps)
+    impacts, losses = run.impacts, np.zeros(run.steps)
     v, dv = impacts.v_plus + impacts.v_minus, impacts.v_plus - impacts.v_minus
     np.add.at(losses, impacts.step, -0.5 * np.einsum("ki,kij,kj->k", dv, trajectory.masses[impacts.step], v))
-    return np.asarray(np.cumsum(losses))
+    pairs = [(np.cumsum(works[name]), run.energy[f"{name}_work"]) for name in _FORCES]
+    pairs += [(kinetic, run.energy["kinetic"]), (potential, run.energy["potential"]),
+              (np.cumsum(losses), run.energy["impact_loss"]), _residuals(trajectory)]
+    wrong = max(float(np.max(np.abs(one - other), initial=0.0)) for one, other in pairs)
+    return wrong / max(size, TINY), 10.0 * len(run.time) * EPS
 
 
 def _residuals(trajectory: Trajectory) -> tuple[Floats, Floats]:

@@ -1,4 +1,5 @@
-"""Differences between the engine and Pinocchio: mechanisms over many random states, and impacts of independent rows.
+"""Differences between the engine and Pinocchio: mechanisms over many random states, and impacts of independent rows;
+and between the engine and the references: mechanics and contacts of a scene.
 
 The mechanisms are random trees, trees with one kind of joint, the scenes, the project's robots and random URDF texts.
 Robots of other projects need a folder that is not part of this project. The engine and Pinocchio each read the URDF
@@ -13,24 +14,30 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from iapb import resolve_impact
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Mechanism
-from iapb.scene import load_scene
+from iapb.scene import Scene, load_scene
 from iapb.scene.mechanism import mechanism_of
-from reference.random_mechanisms import random_mechanism, random_state
+from iapb.system import System
+from reference import Floats
+from reference.contact_finding import Contacts, find_contacts
+from reference.contact_rows import contact_jacobian, mechanics_of
+from reference.random_mechanisms import random_inertia, random_mechanism, random_state
 from reference.rigid_body import PinocchioMechanism, impulse_dynamics, model_from_urdf, model_of
 from verification.check import Check, Study
 from verification.finding import NOT_TESTABLE, Part, verdict_of_law
-from verification.mechanics.engine_differences import compare
-from verification.mechanics.random_urdf import random_urdf
 from verification.table import Row, Table
 
 # Relative to the largest entry. For chains of 30 links each algorithm is accurate to about 1e-14.
 AGREEMENT = 1e-11
+EARTH = (0.0, 0.0, -9.81)  # [m/s^2]
+SAME = 1e-9  # contacts that differ by more are different contacts; rounding of a dozen products is about 1e-14
 STATES = 100
 TREE_SIZES = (1, 2, 4, 8, 16, 30)
 TREES = {"quick": 3, "full": 50}  # trees of each size
@@ -64,7 +71,7 @@ _SETS = {
 
 @dataclass(frozen=True)
 class Case:
-    """Mechanisms of one row: `make` returns them with Pinocchio's models, from the generator with the given seed."""
+    """Mechanisms of one row; `make` returns them with Pinocchio's models."""
 
     set: str
     label: str
@@ -141,6 +148,100 @@ def _rows(_: Study, case: Case) -> Iterator[Row]:
                "worst": max(largest.values())}  # fmt: skip
 
 
+TYPES = ("revolute", "continuous", "prismatic", "floating", "fixed")
+
+
+def random_urdf(rng: np.random.Generator, links: int) -> str:
+    """Return the URDF text of a robot with a base and `links` more links, each attached to a random earlier link.
+
+    It has every joint type but planar, whose coordinates differ between readers, rotated inertias, and names whose
+    order is not that of the lines.
+    """
+    names = [f"link_{k}" for k in rng.permutation(links + 1)]
+    joints = [f"joint_{k}" for k in rng.permutation(links)]
+    parts = [_link(rng, name) for name in names]
+    for k, joint in enumerate(joints, start=1):
+        parts.append(_joint(rng, joint, TYPES[k % len(TYPES)], names[int(rng.integers(k))], names[k]))
+    return "\n".join(['<robot name="random">', *parts, "</robot>"])
+
+
+def _link(rng: np.random.Generator, name: str) -> str:
+    mass = 10.0 ** rng.uniform(-1.0, 1.0)
+    inertia = random_inertia(rng, mass)
+    places = [(i, j) for i in range(3) for j in range(i, 3)]
+    entries = " ".join(f'i{"xyz"[i]}{"xyz"[j]}="{float(inertia[i, j])!r}"' for i, j in places)
+    return (f'<link name="{name}"><inertial>{_origin(rng)}<mass value="{mass!r}"/>'
+            f"<inertia {entries}/></inertial></link>")  # fmt: skip
+
+
+def _joint(rng: np.random.Generator, name: str, kind: str, parent: str, child: str) -> str:
+    axis = rng.normal(size=3)
+    limits = '<limit lower="-3" upper="3" effort="10" velocity="10"/>'
+    return (f'<joint name="{name}" type="{kind}">{_origin(rng)}<parent link="{parent}"/><child link="{child}"/>'
+            f'<axis xyz="{_numbers(axis)}"/>{limits}</joint>')  # fmt: skip
+
+
+def _origin(rng: np.random.Generator) -> str:
+    return f'<origin xyz="{_numbers(rng.normal(scale=0.3, size=3))}" rpy="{_numbers(rng.uniform(-3, 3, size=3))}"/>'
+
+
+def _numbers(values: Floats) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def compare(
+    mechanism: Mechanism, reference: PinocchioMechanism, q: Floats, v: Floats, gravity: ArrayLike = EARTH
+) -> dict[str, float]:
+    """Return the largest difference of each quantity, relative to the reference's largest entry.
+
+    Some quantities use another scale. The potential energy, whose zero is a convention, is relative to the sum of
+    m |g| |c|. A bias may nearly vanish (a centre of mass almost on its axis, a body that hardly turns), so its scale is
+    at least the size of the terms in its sum. These are m |c| w^2 with the fastest rate w, because the rounding of the
+    world positions c affects every lever arm, and v x m v, which is zero but is computed from terms of the size of
+    twice the kinetic energy. Point Jacobians are compared at a point one metre off each body's origin.
+    """
+    m, p, dv = mechanism, reference, np.cos(np.arange(mechanism.nv))
+    pairs: dict[str, list[tuple[Any, Any]]] = {
+        "mass_matrix": [(m.mass_matrix(q), p.mass_matrix(q))], "bias": [(m.bias(q, v), p.bias(q, v))],
+        "gravity": [(m.gravity(q, gravity), p.gravity(q, gravity))],
+        "inverse_dynamics": [(m.inverse_dynamics(q, v, dv, gravity), p.inverse_dynamics(q, v, dv, gravity))],
+        "kinetic_energy": [(m.kinetic_energy(q, v), p.kinetic_energy(q, v))],
+        "potential_energy": [(m.potential_energy(q, gravity), p.potential_energy(q, gravity))],
+        "momentum": [(m.centroidal_momentum(q, v), p.centroidal_momentum(q, v))],
+        "placement": [], "point_jacobian": [], "frame_jacobian": [],
+    }  # fmt: skip
+    rotations, positions = m.placements(q)
+    for b, name in enumerate(m.names):
+        rotation, position = p.placement(q, name)
+        point = positions[b] + np.array([0.6, 0.0, -0.8])
+        pairs["placement"] += [(rotations[b], rotation), (positions[b], position)]
+        pairs["point_jacobian"] += [(m.point_jacobian(q, b, point), p.point_jacobian(q, name, point))]
+        pairs["frame_jacobian"] += [(m.frame_jacobian(q, b), p.frame_jacobian(q, name))]
+    lifted = float(np.linalg.norm(gravity)) * _spread(m, q)
+    floors = {"bias": _swung(m, q, v), "potential_energy": lifted}
+    return {name: relative_difference(found, floors.get(name, 0.0)) for name, found in pairs.items()}
+
+
+def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
+    """Sum of m |c| w^2 [N], or of m v^2 [N m]: the size of the terms of a bias, whose sum may be near zero."""
+    fastest = float(np.max(np.abs(v[mechanism.arrays.dof_rotates]), initial=0.0))
+    return max(fastest**2 * _spread(mechanism, q), 2.0 * mechanism.kinetic_energy(q, v))
+
+
+def _spread(mechanism: Mechanism, q: Floats) -> float:
+    """Sum of m |c| [kg m]."""
+    rotations, positions = mechanism.placements(q)
+    bodies = zip(mechanism.bodies, rotations, positions, strict=True)
+    return sum(body.mass * float(np.linalg.norm(p + R @ body.center_of_mass)) for body, R, p in bodies)
+
+
+def relative_difference(pairs: list[tuple[Any, Any]], floor: float = 0.0) -> float:
+    """Return the largest |ours - theirs| of all pairs, divided by the larger of `floor` and the largest |theirs|."""
+    scale = max([floor, *(float(np.max(np.abs(theirs), initial=0.0)) for _, theirs in pairs)])
+    gap = max([0.0, *(float(np.max(np.abs(ours - theirs), initial=0.0)) for ours, theirs in pairs)])
+    return gap / scale if scale > 0.0 else gap
+
+
 def agreement(table: Table) -> Iterator[Part]:
     """Yield the part on each set of mechanisms: their largest difference from Pinocchio."""
     for name, words in _SETS.items():
@@ -170,8 +271,7 @@ _EASY, _HARDEST = 10.0, 1e6  # condition numbers κ(A): up to the first, plain r
 
 def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
     """Yield the largest differences of v⁺ between the engine and Pinocchio's impulseDynamics, kinetic metric."""
-    rng = np.random.default_rng(2)
-    shares, easy = [], []
+    rng, shares, easy = np.random.default_rng(2), list[float](), list[float]()
     for _impact in range(impacts):
         d = int(rng.integers(1, 13))
         c = int(rng.integers(1, d + 1))
@@ -182,18 +282,16 @@ def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
         condition = float(np.linalg.cond(np.linalg.solve(L, J.T)))
         if condition > _HARDEST:
             continue
-        ours, theirs = resolve_impact(M, J, v, e).velocity, impulse_dynamics(M, J, v, e)
-        error = float(np.linalg.norm(L.T @ (ours - theirs)) / np.linalg.norm(L.T @ v))
+        difference = resolve_impact(M, J, v, e).velocity - impulse_dynamics(M, J, v, e)
+        error = float(np.linalg.norm(L.T @ difference) / np.linalg.norm(L.T @ v))
         shares.append(error / (100.0 * d * _EPS * condition**2))
-        if condition <= _EASY:
-            easy.append(error)
-    for quantity, errors, tolerance, why in (
-        ("v⁺ of independent rows, as a share of 100 d ε κ(A)²", shares, 1.0, "a hundred roundings per coordinate, "
-         "times κ(A)², the condition of the Delassus matrix that it forms"),
-        ("v⁺ where κ(A) ≤ 10, kinetic metric", easy, 1e-12, "plain rounding"),
-    ):  # fmt: skip
-        yield {"quantity": quantity, "cases": len(errors), "largest difference": max(errors), "tolerance": tolerance,
-               "why this tolerance": why}  # fmt: skip
+        easy += [error] if condition <= _EASY else []
+    yield {"quantity": "v⁺ of independent rows, as a share of 100 d ε κ(A)²", "cases": len(shares),
+           "largest difference": max(shares), "tolerance": 1.0,
+           "why this tolerance": "a hundred roundings per coordinate, times κ(A)², the condition of the Delassus "
+           "matrix that it forms"}  # fmt: skip
+    yield {"quantity": "v⁺ where κ(A) ≤ 10, kinetic metric", "cases": len(easy), "largest difference": max(easy),
+           "tolerance": 1e-12, "why this tolerance": "plain rounding"}  # fmt: skip
 
 
 def _impacts_agree(table: Table) -> str:
@@ -208,3 +306,66 @@ IMPULSE_DYNAMICS = Check(
     cases=lambda _: (2000,), row=_impulse_dynamics, says=_impacts_agree, prose=("why this tolerance",), digits=2,
     holds=lambda row: bool(row["largest difference"] <= row["tolerance"]),
 )  # fmt: skip
+
+
+# Mechanics and contacts of a scene, by the engine and by the references.
+def scene_difference(scene: Scene, configurations: int = 50, seed: int = 0) -> Row:
+    """Compare the engine's mechanics and narrow phase with Pinocchio and `contact_finding`.
+
+    The configurations are the initial one of the scene and random ones around it, displaced by 1e-6 to 1 [m, rad]. The
+    differences are the largest ones: relative to the largest entry for mechanics, absolute for contacts. "With other
+    contacts" counts configurations whose contacts differ in number or by more than SAME, for instance because two faces
+    are equally close and each side takes another one.
+    """
+    system, rng = System(scene), np.random.default_rng(seed)
+    m, start = system.mechanism, system.make_state().q
+    mechanics, contacts, apart, compared = np.zeros(3), np.zeros(4), 0, 0
+    for k in range(configurations):
+        moved = rng.normal(size=m.nv) * 10.0 ** rng.uniform(-6.0, 0.0) if k else np.zeros(m.nv)
+        q, v = m.integrate(start, moved), rng.normal(size=m.nv)
+        mechanics = np.maximum(mechanics, _mechanics_apart(system, q, v))
+        found = _contacts_apart(system, q)
+        if found is None:
+            apart += 1
+        else:
+            contacts, compared = np.maximum(contacts, found[1]), compared + found[0]
+    (mass, inner, frame), (_, normal, gap, row) = mechanics.tolist(), contacts.tolist()
+    return {"scene": scene.name, "configurations": configurations, "with other contacts": apart, "M": mass,
+            "B + G": inner, "frame Jacobians": frame, "contacts": compared, "gap [m]": gap, "normal": normal,
+            "contact row": row}  # fmt: skip
+
+
+def _mechanics_apart(system: System, q: Floats, v: Floats) -> list[float]:
+    """Relative differences of M, B + G and frame Jacobians."""
+    m, reference = system.mechanism, mechanics_of(system)
+    frames = reference.bodies(q)[2][:-1]
+    inner = reference.inner_forces(q, v, system.gravity)
+    weight = float(np.linalg.norm(system.gravity)) * _spread(m, q)
+    return [
+        relative_difference([(m.mass_matrix(q), reference.mass_matrix(q))]),
+        relative_difference([(m.bias(q, v) + m.gravity(q, system.gravity), inner)], max(_swung(m, q, v), weight)),
+        relative_difference([(np.array([m.frame_jacobian(q, b) for b in range(len(frames))]), frames)]),
+    ]
+
+
+def _contacts_apart(system: System, q: Floats) -> tuple[int, Floats] | None:
+    """Number of contacts, and largest differences (4,) of point, normal, gap, row; None if these are other contacts."""
+    axes, origins, frames = mechanics_of(system).bodies(q)
+    theirs = find_contacts(system.shapes, system.pairs, axes, origins, np.inf)
+    found = system.contacts_at(q, np.inf)
+    ours = Contacts(*(getattr(found, name) for name in Contacts._fields))
+    count = len(ours.gap)
+    if count != len(theirs.gap):
+        return None
+    first, second = ((each.point, each.normal, each.gap, contact_jacobian(each.normal, each, origins, frames))
+                     for each in (ours, theirs))  # fmt: skip
+    worst, left = np.zeros(4), list(range(count))
+    for i in range(count):
+        pair = [j for j in left if theirs.shape_a[j] == ours.shape_a[i] and theirs.shape_b[j] == ours.shape_b[i]]
+        apart = {j: [float(np.abs(a[i] - b[j]).max()) for a, b in zip(first, second, strict=True)] for j in pair}
+        nearest = min(pair, key=lambda j: max(apart[j]), default=None)
+        if nearest is None or max(apart[nearest]) > SAME:
+            return None
+        worst = np.maximum(worst, apart[nearest])
+        left.remove(nearest)
+    return count, worst

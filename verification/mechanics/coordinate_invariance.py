@@ -3,6 +3,9 @@
 With q = f(r), T = df/dr and v_q = T v_r, T maps the velocity found in r back to q. In exact arithmetic the result does
 not depend on f. In doubles the condition number of M' = T^T M T grows by up to kappa(T)^2, and nearly dependent rows
 amplify errors by 1/sigma_min.
+
+The equations in absolute angles r_i, measured from the x axis, are independent of the engine: a point at distance s
+along link k is at sum_(i<k) l_i u(r_i) + s u(r_k) with u = (cos, sin), so that M'_ij = mu_ij cos(r_i - r_j).
 """
 
 from __future__ import annotations
@@ -12,16 +15,13 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb import resolve_impact
 from iapb.errors import IapbError
-from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from reference import Floats
 from verification.check import Check, Study
-from verification.mechanics.planar_arm import Contact, PlanarArm
 from verification.table import Row, Table
-
-Floats = NDArray[np.float64]
 
 EPSILON = float(np.finfo(np.float64).eps)
 AGREEMENT = 1e-10  # tolerance relative to the velocity in the kinetic metric, for moderate condition numbers:
@@ -30,36 +30,78 @@ SEPARATED = 0.1  # and least sigma_min of independent rows of unit length
 CONSTANT = 10.0  # C of the bound, times d: a Cholesky factor, two solves and a projection
 SEED = 20050606
 
-ARM = PlanarArm((1.0, 1.0, 0.6), (1.0, 1.0, 0.5))
+LENGTHS, MASSES = np.array([1.0, 1.0, 0.6]), np.array([1.0, 1.0, 0.5])  # [m], [kg] of a chain of slender uniform rods
+LINKS = len(LENGTHS)
 # Angle of the second joint [rad]. At 0, the singular pose, the hand's position is no valid coordinate, but angles are.
 ELBOWS = (*(10.0**-k for k in range(13)), 0.0)
 POSES = {"quick": 4, "full": 40}  # random other angles and velocities for each elbow
 RESTITUTIONS = (0.0, 0.7, 1.0)
 ACROSS = 0.5 * np.pi
+
+
+class Contact(NamedTuple):
+    """A contact on the arm: link, distance [m] from the link's joint along it, angle [rad] from link to normal."""
+
+    link: int
+    distance: float
+    angle: float
+
+
+_UPPER, _LAST = Contact(1, 0.7, ACROSS), Contact(2, 0.4, 0.7)
 CONTACTS = {
     "one": (Contact(2, 0.4, ACROSS),),
-    "two, separated": (Contact(1, 0.7, ACROSS), Contact(2, 0.4, 0.7)),
-    "three, two of them one contact twice": (
-        Contact(1, 0.7, ACROSS),
-        Contact(2, 0.4, 0.7),
-        Contact(1, 0.7, ACROSS),
-    ),
+    "two, separated": (_UPPER, _LAST),
+    "three, two of them one contact twice": (_UPPER, _LAST, _UPPER),
     "one, pressed from both sides": (Contact(2, 0.4, ACROSS), Contact(2, 0.4, ACROSS - np.pi)),
 }
 # two contacts on one link at decreasing distance: nearly dependent rows
-CLOSE = {f"two, {gap:g} m apart": (Contact(1, 0.7, ACROSS), Contact(1, 0.7 + gap, ACROSS))
-         for gap in (1e-2, 1e-4, 1e-6, 1e-8)}  # fmt: skip
+CLOSE = {f"two, {gap:g} m apart": (_UPPER, Contact(1, 0.7 + gap, ACROSS)) for gap in (1e-2, 1e-4, 1e-6, 1e-8)}
 
 ABSOLUTE, HAND = "absolute angles", "place of the hand"
 
 
-class Impact(NamedTuple):
-    """An impact of the arm in joint angles: pose, contacts, velocity and restitution."""
+def arm() -> Mechanism:
+    """Return the arm as a mechanism of the engine, with joints about z."""
+    bodies = []
+    for k, (length, mass) in enumerate(zip(LENGTHS, MASSES, strict=True)):
+        parent, start = (f"link {k - 1}", LENGTHS[k - 1]) if k else (None, 0.0)
+        slender = mass * length**2 / 12.0 * np.diag([0.0, 1.0, 1.0])
+        placement = np.eye(3), (start, 0.0, 0.0)
+        bodies.append(Body(f"link {k}", parent, Joint("revolute"), placement, mass, (0.5 * length, 0.0, 0.0), slender))
+    return Mechanism(bodies)
 
-    q: Floats
-    contacts: tuple[Contact, ...]
-    velocity: Floats
-    restitution: float
+
+def _arms(link: int, distance: float) -> Floats:
+    """Length (d,) [m] that each link contributes to the position of a point."""
+    return np.array([*LENGTHS[:link], distance, *[0.0] * (LINKS - link - 1)])
+
+
+def absolute_mass_matrix(r: Floats) -> Floats:
+    """Return M'(r) of the absolute angles."""
+    arms = np.array([_arms(k, 0.5 * length) for k, length in enumerate(LENGTHS)])
+    return (arms.T * MASSES) @ arms * np.cos(r[:, None] - r[None, :]) + np.diag(MASSES * LENGTHS**2 / 12.0)
+
+
+def absolute_row(r: Floats, contact: Contact) -> Floats:
+    """Return n^T dx/dr (d,) of the contact's point."""
+    return _arms(contact.link, contact.distance) * np.sin(r[contact.link] + contact.angle - r)  # n . (-sin, cos)
+
+
+def joint_rows(mechanism: Mechanism, q: Floats, contacts: tuple[Contact, ...]) -> Floats:
+    """Return n^T J (c, d) of the contacts in joint angles, computed by the engine."""
+    (rotations, positions), rows = mechanism.placements(q), []
+    for link, distance, angle in contacts:
+        normal = rotations[link] @ np.array([np.cos(angle), np.sin(angle), 0.0])
+        point = positions[link] + distance * rotations[link][:, 0]
+        rows.append(normal @ mechanism.point_jacobian(q, link, point))
+    return np.array(rows)
+
+
+def hand_jacobian(mechanism: Mechanism, q: Floats) -> Floats:
+    """Return d(hand)/dq (d, d): position (x, y) of the second link's end, and the sum of the angles."""
+    rotations, positions = mechanism.placements(q)
+    tip = positions[1] + LENGTHS[1] * rotations[1][:, 0]
+    return np.vstack([mechanism.point_jacobian(q, 1, tip)[:2], np.ones(LINKS)])
 
 
 def _cases(_: Study) -> Iterator[tuple[str, str, float]]:
@@ -68,51 +110,54 @@ def _cases(_: Study) -> Iterator[tuple[str, str, float]]:
             yield case
 
 
-def _row(study: Study, case: tuple[str, str, float]) -> dict[str, Any]:
+def _row(study: Study, case: tuple[str, str, float]) -> Row:
+    """The impact with the largest error / tolerance of some random poses, and the number of refused impacts."""
     coordinates, label, elbow = case
-    rng, mechanism = np.random.default_rng([SEED, ELBOWS.index(elbow)]), ARM.mechanism()
-    impacts = _impacts(rng, elbow, {**CONTACTS, **CLOSE}[label], POSES[study.depth])
-    found = [compare(mechanism, impact, coordinates) for impact in impacts]
-    return {"coordinates": coordinates, "contacts": label, "elbow [rad]": elbow, **_worst(found)}
-
-
-def _impacts(
-    rng: np.random.Generator, elbow: float, contacts: tuple[Contact, ...], poses: int
-) -> Iterator[Impact]:
-    for k in range(poses):
+    rng, mechanism = np.random.default_rng([SEED, ELBOWS.index(elbow)]), arm()
+    rows = []
+    for k in range(POSES[study.depth]):
         q = np.array([rng.uniform(-np.pi, np.pi), elbow, rng.uniform(-1.5, 1.5)])
-        yield Impact(q, contacts, rng.normal(size=ARM.links), RESTITUTIONS[k % len(RESTITUTIONS)])
+        v, e = rng.normal(size=LINKS), RESTITUTIONS[k % len(RESTITUTIONS)]
+        rows.append(compare(mechanism, q, v, e, {**CONTACTS, **CLOSE}[label], coordinates))
+    solved = [row for row in rows if row["error"] is not None]
+    worst = max(solved or rows, key=lambda row: (row["error"] or 0.0) / row["tolerance"])
+    return {"coordinates": coordinates, "contacts": label, "elbow [rad]": elbow, **worst,
+            "refused": len(rows) - len(solved)}  # fmt: skip
 
 
-def compare(mechanism: Mechanism, impact: Impact, coordinates: str) -> dict[str, Any]:
-    """Return error, bound and condition numbers of one impact; `refused` is 1 if the other coordinates are refused."""
-    q, v, e = impact.q, impact.velocity, impact.restitution
-    mass, rows = mechanism.mass_matrix(q), ARM.joint_rows(mechanism, q, impact.contacts)
+def compare(
+    mechanism: Mechanism, q: Floats, v: Floats, e: float, contacts: tuple[Contact, ...], coordinates: str
+) -> dict[str, Any]:
+    """Return condition numbers, error, bound and tolerance of one impact; the error of a refused impact is None."""
+    mass, rows = mechanism.mass_matrix(q), joint_rows(mechanism, q, contacts)
     here = resolve_impact(mass, rows, v, e)
-    new_mass, new_rows, change = _transformed(mechanism, impact, coordinates)
+    new_mass, new_rows, change = _transformed(mechanism, q, contacts, coordinates)
     squared = float(np.linalg.cond(change)) ** 2
     sigma, kappa = _separation(mass, rows, here.rank), float(np.linalg.cond(mass))
-    bound = CONSTANT * len(v) * EPSILON * kappa * squared / sigma
-    row = {"κ(M)": kappa, "κ(∂f/∂r)²": squared, "σ_min": sigma, "bound": bound, "refused": 0}
+    error: float | None
     try:
         there = resolve_impact(new_mass, new_rows, np.linalg.solve(change, v), e)
+        difference = here.velocity - change @ there.velocity
+        error = float(np.sqrt((difference @ mass @ difference) / (v @ mass @ v)))
     except IapbError:  # the mass matrix of these coordinates is not positive definite in doubles any more
-        return row | {"refused": 1, "error": None}
-    difference = here.velocity - change @ there.velocity
-    return row | {"error": float(np.sqrt((difference @ mass @ difference) / (v @ mass @ v)))}
+        error = None
+    bound = CONSTANT * LINKS * EPSILON * kappa * squared / sigma
+    moderate = kappa <= MODERATE and squared <= MODERATE and sigma >= SEPARATED
+    return {"κ(M)": kappa, "κ(∂f/∂r)²": squared, "σ_min": sigma, "error": error, "bound": bound,
+            "tolerance": AGREEMENT if moderate else bound}  # fmt: skip
 
 
-def _transformed(mechanism: Mechanism, impact: Impact, coordinates: str) -> tuple[Floats, Floats, Floats]:
+def _transformed(
+    mechanism: Mechanism, q: Floats, contacts: tuple[Contact, ...], coordinates: str
+) -> tuple[Floats, Floats, Floats]:
     """M', J' and T = df/dr in the other coordinates."""
-    q = impact.q
     if coordinates == ABSOLUTE:
         r = np.cumsum(q)
-        change = np.eye(ARM.links) - np.eye(ARM.links, k=-1)  # q_i = r_i - r_(i-1)
-        rows = np.array([ARM.absolute_row(r, contact) for contact in impact.contacts])
-        return ARM.absolute_mass_matrix(r), rows, change
-    change = np.array(np.linalg.inv(ARM.hand_jacobian(mechanism, q)), np.float64)
+        rows = np.array([absolute_row(r, contact) for contact in contacts])
+        return absolute_mass_matrix(r), rows, np.eye(LINKS) - np.eye(LINKS, k=-1)  # q_i = r_i - r_(i-1)
+    change = np.array(np.linalg.inv(hand_jacobian(mechanism, q)), np.float64)
     new_mass = change.T @ mechanism.mass_matrix(q) @ change
-    return 0.5 * (new_mass + new_mass.T), ARM.joint_rows(mechanism, q, impact.contacts) @ change, change
+    return 0.5 * (new_mass + new_mass.T), joint_rows(mechanism, q, contacts) @ change, change
 
 
 def _separation(mass: Floats, rows: Floats, rank: int) -> float:
@@ -122,23 +167,6 @@ def _separation(mass: Floats, rows: Floats, rank: int) -> float:
     return float(values[rank - 1])
 
 
-_NAMES = ("κ(M)", "κ(∂f/∂r)²", "σ_min", "error", "bound", "tolerance")
-
-
-def _worst(found: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the impact with the largest error / tolerance, and the number of refused impacts."""
-    rows = [row | {"tolerance": tolerance_of(row)} for row in found]
-    solved = [row for row in rows if row["error"] is not None]
-    worst = max(solved or rows, key=lambda row: (row["error"] or 0.0) / row["tolerance"])
-    return {name: worst[name] for name in _NAMES} | {"refused": sum(row["refused"] for row in rows)}
-
-
-def tolerance_of(row: Row) -> float:
-    """Return 1e-10 if the condition numbers are moderate, else the rounding bound."""
-    moderate = row["κ(M)"] <= MODERATE and row["κ(∂f/∂r)²"] <= MODERATE and row["σ_min"] >= SEPARATED
-    return AGREEMENT if moderate else float(row["bound"])
-
-
 def holds(row: Row) -> bool | None:
     """Judge a row: a tolerance of 1 or more gives no outcome; otherwise a refused impact is a failure."""
     return None if row["tolerance"] >= 1.0 else row["refused"] == 0 and row["error"] <= row["tolerance"]
@@ -146,14 +174,14 @@ def holds(row: Row) -> bool | None:
 
 def invariance(table: Table) -> str:
     """Return the error for moderate condition numbers, and for the other cases, in words."""
-    rows = [(row, held) for row, held in zip(table.records(), table.holds, strict=True)]
-    moderate = [row["error"] for row, _ in rows if row["tolerance"] == AGREEMENT]
-    beyond = [row["error"] / row["bound"] for row, held in rows if held is not None and row["tolerance"] != AGREEMENT]
+    moderate = table.where(tolerance=AGREEMENT).column("error")
+    beyond = [row["error"] / row["bound"] for row, held in zip(table.records(), table.holds, strict=True)
+              if held is not None and row["tolerance"] != AGREEMENT]  # fmt: skip
     return (
         f"C06: the same impact, solved in two sets of coordinates, agrees to {max(moderate):.1e} in {len(moderate)} "
         f"cases of moderate condition number (tolerance {AGREEMENT:g}). In {len(beyond)} worse conditioned cases, up "
         f"to the singular pose, the error is at most {max(beyond):.1e} of the rounding bound C ε κ/σ_min. In "
-        f"{sum(held is None for _, held in rows)} cases this bound exceeds 1, so they cannot be judged.")  # fmt: skip
+        f"{table.holds.count(None)} cases this bound exceeds 1, so they cannot be judged.")  # fmt: skip
 
 
 COORDINATES = Check(

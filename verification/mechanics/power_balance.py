@@ -7,21 +7,17 @@ consistent; if any term is wrong, the defect does not fall.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from itertools import product
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Mechanism
+from reference import Floats
 from reference.random_mechanisms import random_mechanism, random_state
 from verification.check import Check, Study
-from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
+from verification.mechanics.tumbling import COMMUTATOR_FREE_4, spans
 from verification.table import Row, Table
-
-Floats = NDArray[np.float64]
 
 FIELD = np.array([0.5, -9.81, 2.0])  # [m/s^2], along no axis
 METHODS = {method.name: method for method in
@@ -38,6 +34,7 @@ ORDER_TOLERANCE = 0.25  # of the median over trees, for the next error terms, wh
 LARGEST_CONDITION = 1e12
 LEAST_SHARE = 0.5  # share of the trees that must show an order; if a term is missing, no tree does
 SEED = 20050603
+
 
 def _row(study: Study, case: tuple[str, int]) -> Row:
     (name, joints), trees = case, TREES[study.depth]
@@ -119,10 +116,7 @@ def _definite(study: Study, joints: int) -> Row:
 
 def orders(table: Table) -> str:
     """Return the measured orders of each integrator in words."""
-    found = "; ".join(
-        f"{words(name)} {span([row['median order'] for row in rows])} (declared {rows[0]['declared order']})"
-        for (name,), rows in by(table.records(), "integrator").items()
-    )
+    found = "; ".join(f"{name} {span}" for name, span in spans(table.records(), "median order"))
     return ("Random linkages of 1 to 30 joints: the difference between change of energy and work of the forces falls "
             f"with the order of the integrator. Measured: {found}.")  # fmt: skip
 
@@ -138,26 +132,6 @@ def definiteness(table: Table) -> str:
     return (f"Of {count} random mass matrices, {judged} have a scaled condition number of at most 1e12 (largest "
             f"{largest:.1e}). All of these are positive definite: the least eigenvalue times the condition number is "
             f"never below {least:.2g}.")  # fmt: skip
-
-
-def by(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
-    """Group the rows by the values of the named columns."""
-    found: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        found.setdefault(tuple(row[name] for name in names), []).append(row)
-    return found
-
-
-def span(values: Sequence[float]) -> str:
-    """Return the smallest and the largest value in words."""
-    low, high = f"{min(values):.2f}", f"{max(values):.2f}"
-    return low if low == high else f"{low} to {high}"
-
-
-def words(name: str) -> str:
-    """Return the printed name of an integrator."""
-    return {"semi_implicit_euler": "semi-implicit Euler", "runge_kutta_4": "Runge-Kutta 4",
-            "commutator_free_4": "commutator-free Runge-Kutta 4"}.get(name, name)  # fmt: skip
 
 
 POWER_BALANCE = Check(

@@ -1,30 +1,141 @@
 """Tumbling of a free body: errors of each integrator against the closed form, its drifts, and its measured order.
 
 The study covers every integrator of the compiled simulation, and the fourth-order method that exists only in Python.
+
+Closed form of a torque-free rigid body: Jacobi's elliptic functions for the rates, a quadrature for an angle.
+Source: Landau and Lifshitz, Mechanics, section 37. Principal moments I1 < I2 < I3, energy E, angular momentum L with
+L^2 > 2 E I2 (the body tumbles about its third axis); at t = 0 the second rate is zero and the others are positive:
+
+    w1 = A cn(s t | m),  w2 = B sn(s t | m),  w3 = C dn(s t | m).
+
+The attitude follows because L is constant in space: two angles between the body axes and L are algebraic functions of
+w. The third satisfies d(psi)/dt = L (2 E - I3 w3^2) / (L^2 - I3^2 w3^2), which Gauss-Legendre quadrature integrates to
+machine precision.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import product
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.contact.laws import Penalty
-from iapb.mechanics.integrators import INTEGRATORS, Integrator
+from iapb.mechanics.integrators import INTEGRATORS, Acceleration, Integrate, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
+from reference import Floats
 from verification.check import Check, Study
-from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
-from verification.mechanics.power_balance import by, span, words
-from verification.mechanics.torque_free import TorqueFreeBody
-from verification.table import Table
+from verification.table import Row, Table
 
-Floats = NDArray[np.float64]
+_NODES = 20  # Gauss-Legendre nodes per quarter period: the integrand is smooth and the error is below 1e-15
+
+
+@dataclass(frozen=True)
+class TorqueFreeBody:
+    """Ascending principal moments [kg m^2], and the amplitudes A and C [rad/s] of the first and third rate."""
+
+    moments: tuple[float, float, float]
+    first_rate: float
+    third_rate: float
+
+    @property
+    def energy(self) -> float:
+        """Kinetic energy [J]."""
+        i1, _, i3 = self.moments
+        return 0.5 * (i1 * self.first_rate**2 + i3 * self.third_rate**2)
+
+    @property
+    def momentum(self) -> float:
+        """Magnitude of the angular momentum [N m s]."""
+        i1, _, i3 = self.moments
+        return sqrt((i1 * self.first_rate) ** 2 + (i3 * self.third_rate) ** 2)
+
+    @property
+    def speed_and_parameter(self) -> tuple[float, float]:
+        """s [rad/s] and m of the elliptic functions."""
+        i1, i2, i3 = self.moments
+        twice, square = 2.0 * self.energy, self.momentum**2
+        speed = sqrt((i3 - i2) * (square - twice * i1) / (i1 * i2 * i3))
+        return speed, (i2 - i1) * (twice * i3 - square) / ((i3 - i2) * (square - twice * i1))
+
+    @property
+    def period(self) -> float:
+        """Time [s] after which the rates repeat."""
+        from scipy.special import ellipk
+
+        speed, parameter = self.speed_and_parameter
+        return float(4.0 * ellipk(parameter) / speed)
+
+    def rates(self, time: Floats | float) -> Floats:
+        """Angular velocity (..., 3) [rad/s] in body axes."""
+        from scipy.special import ellipj
+
+        i1, i2, i3 = self.moments
+        speed, parameter = self.speed_and_parameter
+        sn, cn, dn, _ = ellipj(speed * np.asarray(time), parameter)
+        second = sqrt((2.0 * self.energy * i3 - self.momentum**2) / (i2 * (i3 - i2)))
+        return np.stack([self.first_rate * cn, second * sn, self.third_rate * dn], axis=-1)
+
+    def axes(self, time: float) -> Floats:
+        """Body axes as columns (3, 3), in a frame whose z axis is along the angular momentum.
+
+        R = Rz(psi) F(w), where F(w) rotates the direction of L in the body frame, h = I w / L, to z.
+        """
+        angle = self._turned(time)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return turn @ _frame(np.array(self.moments) * self.rates(time) / self.momentum)
+
+    def _turned(self, time: float) -> float:
+        """psi(t): the integral of L (2 E - I3 w3^2) / (L^2 - I3^2 w3^2)."""
+        i3, momentum = self.moments[2], self.momentum
+        nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+        pieces = max(1, int(np.ceil(abs(time) / (0.25 * self.period))))
+        edges = np.linspace(0.0, time, pieces + 1)
+        half = 0.5 * (edges[1] - edges[0])
+        places = edges[:-1, None] + half * (1.0 + nodes)
+        third = i3 * self.rates(places)[..., 2]
+        speed = momentum * (2.0 * self.energy - third**2 / i3) / (momentum**2 - third**2)
+        return float(half * np.sum(speed @ weights))
+
+
+def _frame(h: Floats) -> Floats:
+    """Return F (3, 3) with F h = z and first row along e3 x h; F is smooth as long as h differs from e3."""
+    across = np.array([-h[1], h[0], 0.0])
+    across /= np.linalg.norm(across)
+    return np.array([across, np.cross(h, across), h])
+
+
+class _CommutatorFree4(Integrator):
+    """Commutator-free method of fourth order (Celledoni, Marthinsen and Owren, 2003).
+
+    On vector coordinates it is the classical Runge-Kutta method.
+    """
+
+    __slots__ = ()
+
+    def step(
+        self, integrate: Integrate, acceleration: Acceleration, q: Floats, v: Floats, dt: float
+    ) -> tuple[Floats, Floats]:
+        """Return (q, v) after one step of dt [s], at fourth order on every configuration space."""
+        v1, a1 = v, acceleration(q, v)
+        q2, v2 = integrate(q, v1, 0.5 * dt), v + 0.5 * dt * a1
+        a2 = acceleration(q2, v2)
+        q3, v3 = integrate(q, v2, 0.5 * dt), v + 0.5 * dt * a2
+        a3 = acceleration(q3, v3)
+        q4, v4 = integrate(q2, v3 - 0.5 * v1, dt), v + dt * a3
+        a4 = acceleration(q4, v4)
+        q_half = integrate(q, (3.0 * v1 + 2.0 * v2 + 2.0 * v3 - v4) / 12.0, dt)
+        q_next = integrate(q_half, (3.0 * v4 + 2.0 * v3 + 2.0 * v2 - v1) / 12.0, dt)
+        return q_next, v + dt * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+
+
+COMMUTATOR_FREE_4 = _CommutatorFree4(*INTEGRATORS["runge_kutta_4"]._replace(name="commutator_free_4", group_order=4))
 
 MASS = 0.3  # [kg]
 DRIFT = (0.2, -0.1, 0.3)  # velocity of the centre of mass [m/s]
@@ -34,13 +145,9 @@ MOTIONS = {
     "wobbling": TorqueFreeBody((1e-3, 2e-3, 2.8e-3), 1.0, 3.0),
     "turning over": TorqueFreeBody((1e-3, 2e-3, 2.8e-3), 4.0, 2.8),
 }
-COARSEST = {
-    "momentum": 200,
-    "semi_implicit_euler": 800,
-    "midpoint": 200,
-    "runge_kutta_4": 100,
-    "commutator_free_4": 100,
-}  # steps: small enough to show the order
+# steps: enough to show the order
+COARSEST = {"momentum": 200, "semi_implicit_euler": 800, "midpoint": 200, "runge_kutta_4": 100,
+            "commutator_free_4": 100}  # fmt: skip
 HALVINGS = {"quick": 4, "full": 6}
 ORDER_TOLERANCE = 0.15  # size of the next error term at these steps
 ROUNDING = 1e-10  # smaller errors contain the rounding of some thousand steps (1e-12) and show no order
@@ -66,10 +173,9 @@ METHODS = {method.name: method for method in (*INTEGRATORS.values(), COMMUTATOR_
 
 def _rows(study: Study, case: tuple[str, str]) -> list[dict[str, Any]]:
     """Return the rows of one motion by one integrator, with repeatedly halved steps."""
-    (motion, name), method = case, METHODS[case[1]]
+    head, method = {"motion": case[0], "integrator": case[1]}, METHODS[case[1]]
     path = path_by_python if method is COMMUTATOR_FREE_4 else path_compiled
-    head = {"motion": motion, "integrator": name}
-    halved = _halved(MOTIONS[motion], method, path, HALVINGS[study.depth])
+    halved = _halved(MOTIONS[case[0]], method, path, HALVINGS[study.depth])
     return judged([head | row | {"declared order": method.group_order} for row in halved])
 
 
@@ -103,13 +209,9 @@ def path_compiled(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumbl
     start = [float(x) for x in (*DRIFT, *body.rates(0.0))]
     values = {"rate": steps / DURATION, "duration": DURATION, "bodies.tennis_racket.mass": MASS,
               "bodies.tennis_racket.inertia": list(body.moments), "bodies.tennis_racket.velocity": start}  # fmt: skip
-    run = simulate(_scene().with_values(values), Penalty(integrator=method.name), steps=steps)
+    scene = load_scene(find_scene("tumbling_body")).with_values(values)
+    run = simulate(scene, Penalty(integrator=method.name), steps=steps)
     return _tumble(mechanism_of(body), zip(run.q, run.v, strict=True))
-
-
-@cache
-def _scene() -> Any:
-    return load_scene(find_scene("tumbling_body"))
 
 
 def _tumble(mechanism: Mechanism, path: Iterable[tuple[Floats, Floats]]) -> Tumble:
@@ -122,16 +224,15 @@ def _halved(
     body: TorqueFreeBody, method: Integrator, path: Callable[..., Tumble], halvings: int
 ) -> Iterator[dict[str, Any]]:
     """Yield errors, drifts and their orders for each step length."""
-    truth = exact(body, DURATION)
-    before = dict.fromkeys(ORDERS, np.nan)
+    truth, before = exact(body, DURATION), dict[str, float]()
     for k in range(halvings):
         steps = COARSEST[method.name] << k
         row = {"step [s]": DURATION / steps, **errors(path(body, method, steps), truth, body)}
         both = float(np.hypot(row["attitude error [rad]"], row["rate error [rad/s]"] / body.third_rate))
         now = {"order": both, "energy order": row["energy drift [relative]"],
                "momentum order": row["momentum drift [relative]"]}  # fmt: skip
-        shown = {name: float(np.log2(before[name] / now[name])) for name in ORDERS if now[name] > ROUNDING}
-        yield row | {name: shown[name] if np.isfinite(shown.get(name, np.nan)) else None for name in ORDERS}
+        yield row | {name: float(np.log2(before[name] / now[name])) if before and now[name] > ROUNDING else None
+                     for name in ORDERS}  # fmt: skip
         before = now
 
 
@@ -153,28 +254,32 @@ def judged(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Judge the last measurable order of a series: it must be the declared one; drifts may have a higher order."""
     shown = [row for row in rows if row["order"] is not None]
     if shown:
-        last = {name: [row[name] for row in rows if row[name] is not None] for name in ORDERS}
-        shown[-1]["holds"] = _as_declared(last, shown[-1]["declared order"])
+        last, declared = shown[-1], shown[-1]["declared order"]
+        drifts = [own[-1] for name in DRIFT_ORDERS if (own := [row[name] for row in rows if row[name] is not None])]
+        last["holds"] = (abs(last["order"] - declared) <= ORDER_TOLERANCE
+                         and all(order >= declared - ORDER_TOLERANCE for order in drifts))  # fmt: skip
     return rows
-
-
-def _as_declared(shown: dict[str, list[float]], declared: int) -> bool:
-    """Whether the error has the declared order and each drift at least that order, or no order due to rounding."""
-    drifts = [shown[name][-1] for name in DRIFT_ORDERS if shown[name]]
-    equal = abs(shown["order"][-1] - declared) <= ORDER_TOLERANCE
-    return bool(equal and all(order >= declared - ORDER_TOLERANCE for order in drifts))
 
 
 def convergence(table: Table) -> str:
     """Return the measured orders of each integrator in words."""
     judges = [row for row, held in zip(table.records(), table.holds, strict=True) if held is not None]
-    series = "; ".join(
-        f"{words(name)}: {span([row['order'] for row in rows])} (declared {rows[0]['declared order']})"
-        for (name,), rows in by(judges, "integrator").items()
-    )
+    series = "; ".join(f"{name}: {span}" for name, span in spans(judges, "order"))
     return ("The motion of a free tumbling body converges to the closed form with the order that the integrator "
             "declares; its energy and angular momentum converge at least as fast. Measured orders: "
             f"{series}.")  # fmt: skip
+
+
+def spans(rows: Sequence[Row], order: str) -> Iterator[tuple[str, str]]:
+    """Yield the name of each integrator, and the range of its measured orders with the declared one in words."""
+    for name, declared in dict.fromkeys((row["integrator"], row["declared order"]) for row in rows):
+        own = [row[order] for row in rows if row["integrator"] == name]
+        low, high = f"{min(own):.2f}", f"{max(own):.2f}"
+        yield _WORDS.get(name, str(name)), f"{low if low == high else f'{low} to {high}'} (declared {declared})"
+
+
+_WORDS = {"semi_implicit_euler": "semi-implicit Euler", "runge_kutta_4": "Runge-Kutta 4",
+          "commutator_free_4": "commutator-free Runge-Kutta 4"}  # fmt: skip
 
 
 TUMBLING = Check(

@@ -29,7 +29,7 @@ from verification.proofs import layout
 from verification.proofs.coq_development import ARGUED, NO_ANSWER, Theorem, says, statements
 from verification.proofs.prove import checked
 from verification.proofs.show import NO, NOT_APPLICABLE, YES, ProofRecord
-from verification.table import Column, table_of
+from verification.table import titled
 
 
 def all_proofs() -> tuple[str, ...]:
@@ -62,21 +62,20 @@ def _check_with_coq(name: str) -> ProofRecord:
 def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
               development: Sequence[Theorem] = ()) -> Finding:  # fmt: skip
     """Return the Finding on proofs: proved statements, checking tools, refuted false variants, and Coq's theorems."""
-    rows = [{"statement": one.name, "holds": one.holds,
-             "own kernel": YES if all(step.accepted for step in one.steps) else NO, "SymPy": one.sympy, "Coq": one.coq,
-             "wrong twins": len(one.twins)} for one in records]  # fmt: skip
-    columns = "statement", "holds", "own kernel", "SymPy", "Coq", "wrong twins"
-    table = table_of(tuple(map(Column, columns)), rows)
+    table = titled(("statement", "holds", "own kernel", "SymPy", "Coq", "wrong twins"), [
+        (one.name, one.holds, YES if all(step.accepted for step in one.steps) else NO, one.sympy, one.coq,
+         len(one.twins)) for one in records])  # fmt: skip
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
-    sentence = (f"{proved} of {len(rows)} statements are proved: a program expands the certificate of every step. "
+    sentence = (f"{proved} of {len(records)} statements are proved: a program expands the certificate of every step. "
                 f"SymPy confirms {sum(one.sympy == YES for one in records)} of the proofs. Exact counterexamples "
                 f"refute {twins} deliberately altered statements.")
-    parts = [Part(sentence, REPRODUCED if proved == len(rows) else REFUTED)]
+    parts = [Part(sentence, REPRODUCED if proved == len(records) else REFUTED)]
     tables = {"statements": table}
     if development:
-        theorems = [{"theorem": one.name, "says": says(one.name), "holds": one.holds, "own kernel": NOT_APPLICABLE,
-                     "SymPy": NOT_APPLICABLE, "Coq": one.coq, "assumes": ", ".join(one.axioms)} for one in development]
-        tables["theorems about the code"] = table_of(tuple(map(Column, theorems[0])), theorems)
+        tables["theorems about the code"] = titled(
+            ("theorem", "says", "holds", "own kernel", "SymPy", "Coq", "assumes"),
+            [(one.name, says(one.name), one.holds, NOT_APPLICABLE, NOT_APPLICABLE, one.coq, ", ".join(one.axioms))
+             for one in development])  # fmt: skip
         asked = [one for one in development if one.holds is not None]
         lost = [one for one in development if one.coq == NO_ANSWER]
         accepted = sum(one.holds is True for one in asked)

@@ -19,13 +19,14 @@ Derivation of `gain_bound` (‖x‖² = xᵀMx, Δ the candidate change of veloc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
+
+import numpy as np
 
 from iapb.errors import ArgumentError
 
 UNIT_ROUNDOFF = 2.0**-53
-EPSILON = 2.0 * UNIT_ROUNDOFF
 _MARGIN = 65.0 / 64.0  # covers products of terms that are each below 2⁻¹²
 _SMALL = 2.0**-12
 # In the pivoted factorisation every eligible residual is nearly orthogonal to the basis before its last pass.
@@ -47,9 +48,12 @@ def gain_bound(d: int, kappa: float) -> float:
     ArgumentError
         If d < 1 or kappa < 1, or if kappa is so large that the derivation does not apply (u√κ or τ above 2⁻¹²).
     """
-    _check(d, kappa)
+    if d < 1:
+        raise ArgumentError("d", d, "at least one degree of freedom")
+    if not kappa >= 1.0:
+        raise ArgumentError("kappa", kappa, "a condition number, at least 1")
     u, root = UNIT_ROUNDOFF, math.sqrt(kappa)
-    tau = double_double_error(d, kappa)
+    tau = 16.0 * (d + 1) * math.sqrt(d) * u**2 * kappa
     if u * root > _SMALL or tau > _SMALL:
         raise ArgumentError("kappa", kappa, "a condition number for which u√κ and τ stay below 2⁻¹²")
     return _MARGIN * (12.0 * u + 6.0 * u * root) + 13.0 * tau + 10.0 * u * u * kappa
@@ -57,16 +61,10 @@ def gain_bound(d: int, kappa: float) -> float:
 
 def promised_bound(d: int, kappa: float) -> float:
     """Return 10 d ε √κ, the guaranteed bound; it is at least `gain_bound` for κ ≤ 10²⁴/d (fp_promise)."""
-    _check(d, kappa)
-    return 10.0 * d * EPSILON * math.sqrt(kappa)
+    return 20.0 * d * UNIT_ROUNDOFF * math.sqrt(kappa)
 
 
-def double_double_error(d: int, kappa: float) -> float:
-    """Return τ, the error bound of the double-double energies relative to ‖v‖‖Δ‖."""
-    return 16.0 * (d + 1) * math.sqrt(d) * UNIT_ROUNDOFF**2 * kappa
-
-
-def radius_margins(d: int) -> tuple[Fraction | int, Fraction | int, Fraction | int]:
+def radius_margins(d: int) -> tuple[Fraction, ...]:
     """Margins of the radius of `iapb.contact.kernels.passive.gain` above the need of Coq's `accepted_never_gains`.
 
     `Passive.v` proves bounds of the error of `gain` (gain_error) and of its low part (loop_error). They are linear in
@@ -76,41 +74,26 @@ def radius_margins(d: int) -> tuple[Fraction | int, Fraction | int, Fraction | i
     d + 2.
     """
     u, n = Fraction(1, 2**53), Fraction(d)
+    row, each, eta = np.vectorize(Fraction, otypes=[object])(np.eye(3, dtype=int))  # W, η |Δᵢ| of a row, η
     grown = 1 + 2 * (n + 2) * u  # G
 
-    def error(total: _Linear, b: _Linear, g: Fraction, f: _Linear) -> _Linear:  # error_bound of Passive.v, s = S
-        one = total * (u * grown) + b + f
-        inner = (total * (u * grown) + b) * (2 * n) + total * (2 * u + g + n * (u + g)) + f * n
-        return (inner + one * (n * (n + 1) / 2)) * (grown * u)
+    def error(total: Any, b: Any, g: Fraction, f: Any) -> Any:  # error_bound of Passive.v, s = S
+        one = total * u * grown + b + f
+        inner = (total * u * grown + b) * 2 * n + total * (2 * u + g + n * (u + g)) + f * n
+        return (inner + one * n * (n + 1) / 2) * grown * u
 
-    eta, each = _Linear(0, 0, 1), _Linear(0, 1, 0)  # η once, and η times |Δᵢ| of its row
-    row, g1, f1 = _Linear(1 + u, n, 0), 2 * u * (1 + u), Fraction(2)
-    row_error = error(row, each * 4, g1, each * f1) + _Linear(u * u * (5 + 2 * u), 5 * n, 0)
+    g1, f1, first = 2 * u * (1 + u), Fraction(2), row * (1 + u) + each * n
+    row_error = error(first, each * 4, g1, each * f1) + row * u * u * (5 + 2 * u) + each * 5 * n
     q, z, b = n * u * grown + u + g1, grown * n * (4 + f1), eta * 4
-    g, f = (1 + u) * (q + u), _Linear(0, (1 + u) ** 2 * z, 2)
-    total = row * ((1 + u) * grown) + eta * n
-    left = (row * (q * grown) + each * z) * (u * (3 + u)) + row * (u * (2 + u) * u * grown) + eta * (5 * n)
+    g, f = (1 + u) * (q + u), each * (1 + u) ** 2 * z + eta * 2
+    total = first * (1 + u) * grown + eta * n
+    left = (first * q * grown + each * z) * u * (3 + u) + first * u * (2 + u) * u * grown + eta * 5 * n
     wanted = error(total, b, g, f) + left + row_error * (1 + u)
-    low = ((total * (u * grown) + b + f) * n + total * (u + g)) * grown
+    low = ((total * u * grown + b + f) * n + total * (u + g)) * grown
     kept, share = 1 - (2 * n + 5) * u, 2 * (n + 6) ** 2 * u * u
-    returned = _Linear(kept * share, kept * 16 * n - share * n, kept * 16 * n - share * n - 2) * (1 - u)
-    margins = returned * (1 - u) + (wanted + low * u) * Fraction(-1)
-    return margins.w, margins.change, margins.one
-
-
-@dataclass(frozen=True)
-class _Linear:
-    """The linear form w W + change η Σ|Δᵢ| + one η."""
-
-    w: Fraction | int
-    change: Fraction | int
-    one: Fraction | int
-
-    def __add__(self, other: _Linear) -> _Linear:
-        return _Linear(self.w + other.w, self.change + other.change, self.one + other.one)
-
-    def __mul__(self, factor: Fraction | int) -> _Linear:
-        return _Linear(self.w * factor, self.change * factor, self.one * factor)
+    underflow = kept * 16 * n - share * n
+    returned = (row * kept * share + each * underflow + eta * (underflow - 2)) * (1 - u)
+    return tuple(returned * (1 - u) - wanted - low * u)
 
 
 def gamma(n: int) -> float:
@@ -124,7 +107,6 @@ def projector_bound(d: int, departure: float) -> float:
     |û⁺|² ≤ (1 + g)|u|², g = (√(1 + 4δ(1+δ)) + ρ)² − 1, with δ = `departure` ≥ ‖QᵀQ − I‖₂ (fp_projector) and
     ρ = 2(γ_d + γ_{d+2} + u)√d (1+δ) for the two products with Q and the subtraction. No κ occurs.
     """
-    _check(d, 1.0)
     rounding = 2.0 * (gamma(d) + gamma(d + 2) + UNIT_ROUNDOFF) * math.sqrt(d) * (1.0 + departure)
     exact = 4.0 * departure * (1.0 + departure)
     return exact + 2.0 * math.sqrt(1.0 + exact) * rounding + rounding * rounding
@@ -142,7 +124,6 @@ def orthogonality_bound(d: int) -> float:
 
 def cholesky_error(d: int, kappa: float) -> float:
     """Return η = d γ_{d+1} κ / (1 − d γ_{d+1}), for which |vᵀ(L Lᵀ − M)v| ≤ η vᵀMv (Higham 2002, Theorem 10.3)."""
-    _check(d, kappa)
     g = gamma(d + 1)
     return d * g * kappa / (1.0 - d * g)
 
@@ -160,10 +141,3 @@ def unclamped_bound(d: int, kappa: float) -> float:
     solves = 6.0 * gamma(d + 1) * math.sqrt(d * kappa * (1.0 + eta) / (1.0 - eta))
     growth = 1.0 + projector_bound(d, orthogonality_bound(d))
     return (1.0 + eta) / (1.0 - eta) * growth * (1.0 + solves) ** 2 - 1.0
-
-
-def _check(d: int, kappa: float) -> None:
-    if d < 1:
-        raise ArgumentError("d", d, "at least one degree of freedom")
-    if not kappa >= 1.0:
-        raise ArgumentError("kappa", kappa, "a condition number, at least 1")

@@ -1,18 +1,17 @@
 """SymPy as a second kernel: it reads the text of a statement by itself and checks the whole proof again.
 
-It shares no formula code with the kernel. Python's own grammar parses the formulas; a letter becomes a non-commutative
-symbol, its transpose another symbol, a scalar a commuting symbol. From the kernel it takes only the printed certificate
-of each step, as text, and reads that too: every equation in square brackets must be one that stands before, every term
-must be seen not to be negative, and SymPy must expand the claim minus all of them to zero. One rule goes beyond the
-free algebra: a number (a 1 x 1 word) equals its own transpose.
+It shares no formula code with the kernel. SymPy's own reader parses the formulas; a letter becomes a non-commutative
+symbol, a scalar a commuting symbol. From the kernel it takes only the printed certificate of each step, as text, and
+reads that too: every equation in square brackets must be one that stands before, every term must be seen not to be
+negative, and SymPy must expand the claim minus all of them to zero. One rule goes beyond the free algebra: a number (a
+1 x 1 word) equals its own transpose.
 """
 
 from __future__ import annotations
 
-import ast
-import operator
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import sympy
@@ -20,9 +19,8 @@ import sympy
 from verification.proofs.cases import Case, Comparison
 from verification.proofs.layout import Block
 
-_SIGNS = {"−": "-", "·": "*", "[": "(", "]": ")", "I": "1", "ᵀ": "**T", "²": "**2", "³": "**3", "⁴": "**4"}
-_BETWEEN = re.compile(r"(?<=[\w)])\s*(?=\()|(?<=\))\s*(?=\w)|(?<=\w)\s+(?=\w)")  # between two factors
-_FLIPPED = "ᵀ"
+_SIGNS = {"−": "-", "·": "*", "[": "(", "]": ")", "I": "1", "²": "**2", "³": "**3", "⁴": "**4", "ᵀ": ".transpose()"}
+_BETWEEN = re.compile(r"(?<=[\w)])\s*(?<!transpose)(?=\()|(?<=\))\s*(?=\w)|(?<=\w)\s+(?=\w)")  # between two factors
 
 
 class Relation(NamedTuple):
@@ -33,77 +31,42 @@ class Relation(NamedTuple):
 
 
 class Text:
-    """The formulas of one block, over SymPy's symbols or over the exact matrices of a case."""
+    """The formulas of one block, over SymPy's symbols."""
 
-    def __init__(self, block: Block, case: Case | None = None) -> None:
-        self.shapes, self.exact = block.shapes, case is not None
-        known = [*self.shapes, *(name for name, _ in block.abbreviations)]
-        self.codes = {name: f"x{number}" for number, name in enumerate(known)}
+    def __init__(self, block: Block) -> None:
+        self.shapes, abbreviations = block.shapes, dict(block.abbreviations)
+        self.codes = {name: f"x{number}" for number, name in enumerate((*self.shapes, *abbreviations))}
         marks = sorted([*self.codes, *_SIGNS], key=len, reverse=True)
         self.token = re.compile("|".join(map(re.escape, marks)))
-        self.values: dict[str, Any] = {}
-        for name, shape in self.shapes.items():
-            if case is None:
-                self.values[self.codes[name]] = sympy.Symbol(name, commutative=not shape)
-            elif name in case:
-                rows = [[sympy.Rational(x.numerator, x.denominator) for x in row] for row in case[name]]
-                self.values[self.codes[name]] = sympy.Matrix(rows) if shape else rows[0][0]
-        for name, formula in block.abbreviations:
-            if case is None or set(re.findall(r"x\d+", self.python(formula))) <= set(self.values):
-                self.values[self.codes[name]] = self.read(formula)
-
-    def python(self, formula: str) -> str:
-        """Return the formula as Python: codes for names, and a * between neighbours."""
-        spaced = self.token.sub(lambda m: f" {self.codes[m[0]]} " if m[0] in self.codes else _SIGNS[m[0]], formula)
-        return _BETWEEN.sub("*", re.sub(r"\s+\*\*", "**", spaced.strip()))
+        self.values = {
+            self.codes[name]: sympy.Symbol(name, **{"commutative": False} if shape else {"real": True})
+            for name, shape in self.shapes.items()}  # fmt: skip
+        for name, formula in abbreviations.items():
+            self.values[self.codes[name]] = self.read(formula)
 
     def read(self, formula: str) -> Any:
-        return self.value(ast.parse(self.python(formula), mode="eval").body)
+        """Return the value of a formula, written as Python: codes for names, and a * between neighbours."""
+        spaced = self.token.sub(lambda m: f" {self.codes[m[0]]} " if m[0] in self.codes else _SIGNS[m[0]], formula)
+        return sympy.sympify(_BETWEEN.sub("*", re.sub(r"\s+(?=\*\*|\.)", "", spaced.strip())), locals=self.values)
 
     def relation(self, formula: str) -> Relation:
         left, sign, right = re.split(r"([=≠≤≥⪯⪰≻])", formula)
         low, high = (right, left) if sign in "=≠≥⪰≻" else (left, right)
-        value, sign = _plus(self.read(high), -self.read(low)), {"≤": "≥", "⪯": "⪰"}.get(sign, sign)
-        number = self.exact or value.is_commutative or all(self.is_number(word) for _, word in _words(value))
-        return Relation(value, sign if number or sign != "≥" else "entries")
+        value, sign = self.read(high) - self.read(low), {"≤": "≥", "⪯": "⪰"}.get(sign, sign)
+        return Relation(value, sign if sign != "≥" or self.is_number(value) else "entries")
 
-    def value(self, node: ast.AST) -> Any:
-        match node:
-            case ast.BinOp(left, ast.Pow(), ast.Name("T")):
-                value = self.value(left)
-                return value.T if isinstance(value, sympy.MatrixBase) else self.transposed(value)
-            case ast.BinOp(left, operation, right):
-                return _OPERATIONS[type(operation)](self.value(left), self.value(right))
-            case ast.UnaryOp(ast.USub(), operand):
-                return -self.value(operand)
-            case ast.Name(name):
-                return self.values[name]
-            case ast.Constant(int() as value):
-                return sympy.Integer(value)
-        raise ValueError(f"no formula: {ast.dump(node)}")
+    def is_number(self, value: Any) -> bool:
+        """Whether each product of the sum has one row and one column."""
+        return all(self._size(word[0], 0) == "1" == self._size(word[-1], 1) for _, word in _words(value) if word)
 
-    def transposed(self, value: Any) -> Any:
-        return sympy.Add(*(scale * sympy.Mul(*_reversed(word)) for scale, word in _words(value)))
-
-    def is_number(self, word: Sequence[Any]) -> bool:
-        """Whether the product has one row and one column."""
-        return bool(word) and self._sizes(word[0])[0] == "1" == self._sizes(word[-1])[1]
-
-    def _sizes(self, letter: Any) -> tuple[str, ...]:
-        sizes = self.shapes[letter.name.removesuffix(_FLIPPED)]
-        return sizes[::-1] if letter.name.endswith(_FLIPPED) else sizes
-
-    def canonical(self, value: Any) -> Any:
-        """Return the expanded value; of a 1 x 1 word and its transpose only the first by name remains."""
-        terms = []
-        for scale, word in _words(value):
-            if self.is_number(word):
-                word = min(word, _reversed(word), key=lambda letters: [x.name for x in letters])
-            terms.append(scale * sympy.Mul(*word))
-        return sympy.expand(sympy.Add(*terms))
+    def _size(self, letter: Any, side: int) -> str:
+        """Return the name of the number of rows (0) or columns (1)."""
+        return self.shapes[letter.name][side] if letter.is_Symbol else self.shapes[letter.args[0].name][1 - side]
 
     def same(self, one: Any, other: Any) -> bool:
-        return bool(self.canonical(one - other) == 0)
+        """Whether the values are equal; a number may be transposed."""
+        rest = sympy.expand(one - other)
+        return bool(sympy.expand(rest + rest.transpose() if self.is_number(rest) else rest) == 0)
 
 
 def refusal(block: Block, certificates: Sequence[Sequence[str]], comparisons: Iterable[Comparison] = ()) -> str:
@@ -118,7 +81,7 @@ def refusal(block: Block, certificates: Sequence[Sequence[str]], comparisons: It
     for (entry, rule), lines in zip(steps, certificates, strict=True):
         claim, name = text.relation(entry.formula), entry.words or entry.formula
         if rule and rule[0] in ("cancelling", "dividing", "dominating"):
-            if not any(_follows(rule[0], text, claim, one, other) for one in known for other in (*known, None)):
+            if not any(_follows(rule[0], text, claim, *both) for both in product(known, (*known, None))):
                 return f"'{name}': SymPy finds no facts from which it follows by {rule[0]}"
         elif claim.relation not in ("=", "≥", "⪰"):
             return f"'{name}': a certificate shows no such relation"
@@ -127,12 +90,12 @@ def refusal(block: Block, certificates: Sequence[Sequence[str]], comparisons: It
             for factors in (line.split(" · ") for line in lines):
                 values = [text.read(factor) for factor in factors]
                 equations = [value for factor, value in zip(factors, values, strict=True) if factor[0] == "["]
-                if not (_established(text, equations[0], known) if equations else
-                        claim.relation != "=" and _not_negative(text, values, known)):  # fmt: skip
+                if not (_is_known(equations[0], known, "=") or _is_known(equations[0].transpose(), known, "=")
+                        if equations else claim.relation != "=" and _not_negative(text, values, known)):  # fmt: skip
                     return f"'{name}': SymPy knows no fact for {' · '.join(factors)}"
                 rest -= sympy.Mul(*values)
             if not text.same(rest, 0):
-                return f"'{name}': SymPy leaves {text.canonical(rest)}"
+                return f"'{name}': SymPy leaves {sympy.expand(rest)}"
         known.append(claim)
     false = (each.says for each in comparisons if not each._replace(left=sympy.Rational(each.left)).is_true)
     return next((f"'{says}': false for SymPy" for says in false), "")
@@ -140,68 +103,58 @@ def refusal(block: Block, certificates: Sequence[Sequence[str]], comparisons: It
 
 def holds(block: Block, formula: str, case: Case) -> bool:
     """Whether a formula holds in a case, by SymPy's rational matrices."""
-    value, relation = Text(block, case).relation(formula)
-    matrix = value if isinstance(value, sympy.MatrixBase) else sympy.Matrix([[value]])
+    text = Text(block)
+    value, relation = text.relation(formula)
+    exact = {name: sympy.Matrix([[sympy.Rational(int(x.p), int(x.q)) for x in row] for row in matrix.tolist()])
+             for name, matrix in case.items()}  # fmt: skip
+    parts = []
+    for scale, word in _words(value):
+        factors = [exact[x.name] if x.is_Symbol else exact[x.args[0].name].T for x in word]
+        parts.append((scale.subs({x: exact[x.name][0, 0] for x in scale.free_symbols}), sympy.prod(factors)))
+    shape = next((part.shape for _, part in parts if part != 1), (1, 1))
+    matrix = sympy.zeros(*shape)
+    for scale, part in parts:
+        matrix += scale * (sympy.eye(shape[0]) if part == 1 else part)
     if relation in "=≠":
         return bool(matrix.is_zero_matrix) is (relation == "=")
-    if relation == "≥":
+    if relation in ("≥", "entries"):
         return all(entry >= 0 for entry in matrix)
     symmetric = matrix + matrix.T
     return bool(symmetric.is_positive_definite if relation == "≻" else symmetric.is_positive_semidefinite)
 
 
-def _plus(one: Any, other: Any) -> Any:
-    """Return the sum; a number among matrices is a multiple of the identity."""
-    if isinstance(one, sympy.MatrixBase) is isinstance(other, sympy.MatrixBase):
-        return one + other
-    matrix, scalar = (one, other) if isinstance(one, sympy.MatrixBase) else (other, one)
-    return matrix + (scalar * sympy.eye(matrix.rows) if scalar else sympy.zeros(*matrix.shape))
-
-
-def _words(value: Any) -> list[tuple[Any, tuple[Any, ...]]]:
+def _words(value: Any) -> list[tuple[Any, list[Any]]]:
     """Return the coefficients and words of the expanded sum."""
     found = []
     for term in sympy.Add.make_args(sympy.expand(value)):
-        scalars, letters = term.args_cnc()
-        word: list[Any] = []
-        for factor in letters:
-            base, power = factor.as_base_exp()
-            word += [base] * int(power)
-        found.append((sympy.Mul(*scalars), tuple(word)))
+        scalars, factors = term.args_cnc()
+        powers = (factor.as_base_exp() for factor in factors)
+        found.append((sympy.Mul(*scalars), [letter for letter, power in powers for _ in range(power)]))
     return found
 
 
-def _reversed(word: tuple[Any, ...]) -> tuple[Any, ...]:
-    names = [x.name.removesuffix(_FLIPPED) if x.name.endswith(_FLIPPED) else x.name + _FLIPPED for x in reversed(word)]
-    return tuple(sympy.Symbol(name, commutative=False) for name in names)
-
-
-def _established(text: Text, value: Any, known: Iterable[Relation]) -> bool:
-    return any(fact.relation == "=" and sympy.expand(value - each) == 0
-               for fact in known for each in (fact.value, text.transposed(fact.value)))  # fmt: skip
+def _is_known(value: Any, known: Iterable[Relation], *relations: str) -> bool:
+    return any(fact.relation in relations and sympy.expand(fact.value - value) == 0 for fact in known)
 
 
 def _not_negative(text: Text, factors: list[Any], known: Sequence[Relation]) -> bool:
     """Whether a product is a known form, a square or a pairing of entries, times known scalars and squares of them."""
-    def one_of(value: Any, *relations: str) -> bool:
-        return any(fact.relation in relations and sympy.expand(fact.value - value) == 0 for fact in known)
-
     scalars, matrices = ([x for x in factors if x.is_commutative is kind] for kind in (True, False))
     while scalars:
         first = scalars.pop(0)
         if first in scalars:
             scalars.remove(first)
-        elif not (first.is_positive or one_of(first, "≥")):
+        elif not (first.is_positive or _is_known(first, known, "≥")):
             return False
-    if not matrices or one_of(sympy.Mul(*matrices), "≥", "⪰", "≻"):
+    if not matrices or _is_known(sympy.Mul(*matrices), known, "≥", "⪰", "≻"):
         return True
     if len(matrices) not in (2, 3):
         return False
     first, *core, last = matrices
-    if sympy.expand(text.transposed(first) - last) == 0:
-        return all(one_of(each, "⪰", "≻") for each in core)
-    ends = (text.transposed(first), last, *core)
-    return text.is_number(_words(sympy.Mul(*matrices))[0][1]) and all(one_of(each, "entries") for each in ends)
+    if sympy.expand(first.transpose() - last) == 0:
+        return all(_is_known(each, known, "⪰", "≻") for each in core)
+    return text.is_number(sympy.Mul(*matrices)) and all(
+        _is_known(each, known, "entries") for each in (first.transpose(), last, *core))
 
 
 def _follows(rule: str, text: Text, claim: Relation, source: Relation, other: Relation | None) -> bool:
@@ -209,13 +162,8 @@ def _follows(rule: str, text: Text, claim: Relation, source: Relation, other: Re
     x, value, kind = claim.value, source.value, other and other.relation
     core = other.value if other else sympy.Integer(1)
     if rule == "cancelling" and claim.relation == "=" and source.relation in ("=", "≥", "⪰") and kind in (None, "≻"):
-        return text.same(text.transposed(x) * core * x, value if source.relation == "=" else -value)
+        return text.same(x.transpose() * core * x, value if source.relation == "=" else -value)
     if rule == "dividing" and claim.relation == source.relation == "=" and kind == "≠":
         return text.same(core * x, value)
     return (rule == "dominating" and claim.relation == source.relation == kind == "≥"
             and bool(x.is_commutative and core.is_commutative) and text.same(core * x - x**2, value))  # fmt: skip
-
-
-_OPERATIONS: Mapping[type[ast.operator], Any] = {
-    ast.Add: _plus, ast.Sub: lambda one, other: _plus(one, -other), ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.Pow: operator.pow}  # fmt: skip

@@ -10,13 +10,15 @@ import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 from typing import Any, NamedTuple
 
-from iapb.errors import ArgumentError
-from verification.proofs.words import ANY, Expression, Fact
+from flint import fmpq, fmpq_mat
 
-Matrix = tuple[tuple[Fraction, ...], ...]
-Case = dict[str, Matrix]
+from iapb.errors import ArgumentError
+from verification.proofs.words import ANY, Expression, Fact, names_in
+
+Case = dict[str, fmpq_mat]
 _RELATIONS = {"=": operator.eq, "<": operator.lt, "≤": operator.le, ">": operator.gt, "≥": operator.ge}
 _VALUE = re.compile(r"(\S+?)=(\[[^\]]*\]|\S+)")
 
@@ -34,97 +36,67 @@ class Comparison(NamedTuple):
         return bool(_RELATIONS[self.relation](self.left, self.right))
 
 
-def read_case(text: str, names: Iterable[str], base: Mapping[str, Matrix] | None = None) -> Case:
+def read_case(text: str, names: Iterable[str], base: Mapping[str, fmpq_mat] | None = None) -> Case:
     """Return the case `M=[1 0; 0 1/2] e=−1 ...`; a letter that it leaves out has its value in `base`."""
-    values = {name: _matrix(value) for name, value in _VALUE.findall(text)}
-    rest = _VALUE.sub("", text).strip()
-    if rest or not set(values) <= set(names):
+    rows = {name: value.strip("[]").replace("−", "-").split(";") for name, value in _VALUE.findall(text)}
+    if _VALUE.sub("", text).strip() or not set(rows) <= set(names):
         raise ArgumentError("case", text, f"values of {' '.join(names)}")
-    return {**(base or {}), **values}
+    return {**(base or {}), **{name: matrix_of([row.split() for row in value]) for name, value in rows.items()}}
 
 
-def _matrix(text: str) -> Matrix:
-    rows = text.strip("[]").replace("−", "-").split(";")
-    return tuple(tuple(Fraction(entry) for entry in row.split()) for row in rows)
-
-
-def flint(rows: Sequence[Sequence[Fraction | int]]) -> Any:
+def matrix_of(rows: Sequence[Sequence[Fraction | int | str]]) -> fmpq_mat:
     """Return the rational matrix of python-flint."""
-    from flint import fmpq, fmpq_mat
-
-    entries = [Fraction(entry) for row in rows for entry in row]
-    return fmpq_mat(len(rows), len(rows[0]), [fmpq(each.numerator, each.denominator) for each in entries])
+    return fmpq_mat([[fmpq(*Fraction(entry).as_integer_ratio()) for entry in row] for row in rows])
 
 
-def exact(matrix: Any) -> Matrix:
-    """Return the rows of a matrix of python-flint."""
-    return tuple(tuple(Fraction(int(x.p), int(x.q)) for x in row) for row in matrix.tolist())
-
-
-def value_of(value: Expression, case: Case) -> Matrix:
+def value_of(value: Expression, case: Case) -> fmpq_mat:
     """Return the rational matrix of an expression. Commuting scalars alone give a 1 x 1 matrix."""
+    if missing := names_in(value) - set(case):
+        raise ArgumentError("case", sorted(case), f"a value for {', '.join(sorted(missing))}")
     sizes = {"1": 1, ANY: 1}
     for letter in {each for _, word in value.terms for each in word}:
-        rows = _of(case, letter.name)
-        names = (letter.cols, letter.rows) if letter.flipped else (letter.rows, letter.cols)
-        for name, size in zip(names, (len(rows), len(rows[0])), strict=True):
-            if sizes.setdefault(name, size) != size:
-                raise ArgumentError(letter.name, (len(rows), len(rows[0])), f"size {name} = {sizes[name]}")
-    total = flint([[0] * sizes[value.cols]] * sizes[value.rows])
+        rows, cols = (letter.cols, letter.rows) if letter.flipped else (letter.rows, letter.cols)
+        sizes |= {rows: case[letter.name].nrows(), cols: case[letter.name].ncols()}
+    identity = fmpq_mat([[int(i == j) for j in range(sizes[value.rows])] for i in range(sizes[value.rows])])
+    total = fmpq_mat(sizes[value.rows], sizes[value.cols])
     for (scalars, word), coefficient in value.terms.items():
-        for name in scalars:
-            coefficient *= _of(case, name)[0][0]
-        product = None
-        for letter in word:
-            factor = flint(_of(case, letter.name))
-            factor = factor.transpose() if letter.flipped else factor
-            product = factor if product is None else product * factor
-        if product is None:
-            product = flint([[i == j for j in range(sizes[value.cols])] for i in range(sizes[value.rows])])
-        total = total + product * flint([[coefficient]])[0, 0]
-    return exact(total)
-
-
-def _of(case: Case, name: str) -> Matrix:
-    if name not in case:
-        raise ArgumentError("case", sorted(case), f"a value for {name}")
-    return case[name]
+        factors = [case[each.name].transpose() if each.flipped else case[each.name] for each in word]
+        scale = reduce(operator.mul, [case[name][0, 0] for name in scalars], fmpq(*coefficient.as_integer_ratio()))
+        total += reduce(operator.mul, factors or [identity]) * scale
+    return total
 
 
 def completed(case: Case, definitions: Iterable[Fact]) -> Case:
     """Return the case in which each defined letter (left side) has the value of its definition (right side)."""
     values = dict(case)
     for definition in definitions:
-        (((scalars, word), _),) = definition.lhs.terms.items()
-        values[word[0].name if word else scalars[0]] = value_of(definition.rhs, values)
+        (name,) = names_in(definition.lhs)
+        values[name] = value_of(definition.rhs, values)
     return values
 
 
 def holds(fact: Fact, case: Case) -> bool:
     """Whether a fact holds in a case, by exact arithmetic."""
-    rows = value_of(fact.difference, case)
-    entries = [entry for row in rows for entry in row]
-    if fact.relation == "=":
-        return not any(entries)
-    if fact.relation == "≠":
-        return any(entries)
-    return all(entry >= 0 for entry in entries) if fact.entrywise else definite(rows, strict=fact.relation == "≻")
+    value = value_of(fact.difference, case)
+    if fact.relation in "=≠":
+        return any(value.entries()) is (fact.relation == "≠")
+    if fact.entrywise:
+        return all(entry >= 0 for entry in value.entries())
+    return definite(value, strict=fact.relation == "≻")
 
 
 def all_hold(facts: Iterable[Fact], case: Case) -> bool:
     return all(holds(fact, case) for fact in facts)
 
 
-def definite(rows: Matrix, *, strict: bool) -> bool:
+def definite(value: fmpq_mat, *, strict: bool) -> bool:
     """Whether x' A x >= 0 (strict: > 0) for every x other than 0, by exact elimination on the symmetric part of A."""
-    size = len(rows)
-    a = [[(rows[i][j] + rows[j][i]) / 2 for j in range(size)] for i in range(size)]
-    for k in range(size):
-        if a[k][k] < 0 or (a[k][k] == 0 and (strict or any(a[k][k:]))):
+    a = (value + value.transpose()).tolist()
+    for k, row in enumerate(a):
+        if row[k] < 0 or (row[k] == 0 and (strict or any(row[k:]))):
             return False
-        for i in range(k + 1, size):
-            ratio = a[i][k] / a[k][k] if a[k][k] else Fraction(0)
-            a[i] = [x - ratio * y for x, y in zip(a[i], a[k], strict=True)]
+        for other in a[k + 1 :] if row[k] else ():
+            other[:] = [x - other[k] / row[k] * y for x, y in zip(other, row, strict=True)]
     return True
 
 
@@ -137,8 +109,9 @@ def pseudo_inverse(matrix: Any) -> Any:
     reduced, rank = matrix.rref()
     if rank == 0:
         return matrix.transpose()
-    rows = exact(reduced)[:rank]
+    rows = reduced.tolist()[:rank]
     pivots = [next(j for j, entry in enumerate(row) if entry) for row in rows]
-    columns, echelon = flint([[row[j] for j in pivots] for row in exact(matrix)]), flint(rows)
+    echelon = fmpq_mat(rows)
+    columns = fmpq_mat([[row[j] for j in pivots] for row in matrix.tolist()])
     left = (columns.transpose() * columns).solve(columns.transpose())
     return echelon.transpose() * (echelon * echelon.transpose()).solve(left)

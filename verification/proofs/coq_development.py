@@ -73,7 +73,7 @@ class Theorem:
         return None if self.coq in (NOT_RUN, NO_ANSWER) else self.coq == YES and KNOWN_AXIOMS.issuperset(self.axioms)
 
 
-def theorems(progress: Callable[[int, int], None] = lambda done, total: None,
+def theorems(progress: Callable[[int, int], None] = lambda *_: None,
              failures: list[Failure] | None = None) -> tuple[Theorem, ...]:  # fmt: skip
     """Return every theorem about the code, with Coq's answer, or "not run here" if Coq is not installed."""
     files = sorted(path.stem for path in FOLDER.glob("*.v") if path.stem != STATEMENTS)
@@ -118,19 +118,15 @@ def stated(name: str) -> tuple[str, str]:
 
 def version() -> str:
     """Return the version of `coqc`, or "absent" if it is not installed."""
-    if shutil.which("coqc") is None:
-        return "absent"
-    return subprocess.run(["coqc", "--print-version"], capture_output=True, text=True, check=True).stdout.strip()
+    return _run(["coqc", "--print-version"]).strip() if shutil.which("coqc") else "absent"
 
 
 def lacking(name: str) -> str:
     """Return which program is missing to compile a file of the development; empty if none is."""
-    if shutil.which("coqc") is None:
+    if not shutil.which("coqc"):
         return "coqc is not installed"
-    if "Flocq" in (FOLDER / f"{name}.v").read_text(encoding="utf-8"):
-        library = subprocess.run(["coqc", "-where"], capture_output=True, text=True, check=True).stdout.strip()
-        if not Path(library, "user-contrib", "Flocq").exists():
-            return "Flocq is not installed"
+    if "Flocq" in _source(name) and not Path(_run(["coqc", "-where"]).strip(), "user-contrib", "Flocq").exists():
+        return "Flocq is not installed"
     return ""
 
 
@@ -151,32 +147,19 @@ def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
     asked, answers = _asked(name), _assumptions(said)
     if not asked or len(asked) != len(answers):
         raise IapbError(f"{name}.v asks for the assumptions of {len(asked)} theorems; Coq answers {len(answers)}")
-    return tuple(Theorem(one, YES, tuple(sorted(axioms))) for one, axioms in zip(asked, answers, strict=True))
+    return tuple(Theorem(one, YES, axioms) for one, axioms in zip(asked, answers, strict=True))
+
+
+def _source(name: str) -> str:
+    return (FOLDER / f"{name}.v").read_text(encoding="utf-8")
 
 
 def _asked(name: str) -> list[str]:
     """Return the names of the theorems whose assumptions a file prints."""
-    source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
-    return [line.split()[2].rstrip(".") for line in source.splitlines() if line.startswith("Print Assumptions")]
+    return re.findall(r"^Print Assumptions (\w+)", _source(name), re.MULTILINE)
 
 
-def build_checker(folder: Path) -> Path:
-    """Extract the judge of `Checker.v` and compile the checker; return the program.
-
-    Raises
-    ------
-    MissingDependencyError
-        Coq or OCaml is not installed.
-    """
-    if shutil.which("ocamlopt") is None:
-        raise MissingDependencyError("ocamlopt", "the extracted checker", _HINT)
-    compiled("Checker", folder)
-    shutil.copy(FOLDER / "checker.ml", folder)
-    _run(["ocamlopt", "judge.mli", "judge.ml", "checker.ml", "-o", "checker"], folder)
-    return folder / "checker"
-
-
-def _run(command: list[str], folder: Path) -> str:
+def _run(command: list[str], folder: Path | None = None) -> str:
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", timeout=PATIENCE)
     except subprocess.TimeoutExpired:
@@ -186,13 +169,8 @@ def _run(command: list[str], folder: Path) -> str:
     return done.stdout
 
 
-def _assumptions(said: str) -> list[frozenset[str]]:
+def _assumptions(said: str) -> list[tuple[str, ...]]:
     """Return the axioms that each `Print Assumptions` lists: the unindented lines after "Axioms:"."""
-    found: list[set[str]] = []
-    for line in said.splitlines():
-        if line.startswith(("Axioms:", "Closed under the global context")):
-            found.append(set())
-        elif line and not line[0].isspace() and found:
-            found[-1].add(line.split(":")[0].strip())
-    return [frozenset(one) for one in found]
-
+    answers = re.split(r"^(?:Axioms:|Closed under the global context)", said, flags=re.MULTILINE)[1:]
+    return [tuple(sorted({line.split(":")[0].strip() for line in answer.splitlines() if line[:1].strip()}))
+            for answer in answers]  # fmt: skip

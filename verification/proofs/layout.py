@@ -23,7 +23,7 @@ from a named case (`NAME: e=2`); without a name it starts from the witness.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -33,8 +33,7 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 
 FOLDER = Path(__file__).with_name("statements")
-SHARED = "shared"  # the file with letters and lemmas for all; it states nothing itself
-# In reading order.
+# In reading order; the file `shared` has letters and lemmas for all and states nothing itself.
 FILES = ("theorems", "redundant_rows", "consequences", "resting_contact", "resolver", "impact_laws", "errata",
          "floating_point", "exact_instances")  # fmt: skip
 _PROSE = {"title", "source", "says", "remark", "assumed", "measured"}
@@ -59,9 +58,11 @@ class Block:
     entries: tuple[Entry, ...]
 
     def all(self, *keys: str) -> list[Entry]:
+        """Return the entries with one of these keywords."""
         return [entry for entry in self.entries if entry.key in keys]
 
     def prose(self, key: str) -> tuple[str, ...]:
+        """Return the texts of a keyword of prose."""
         return tuple(entry.formula for entry in self.all(key))
 
     @property
@@ -83,7 +84,7 @@ class Block:
 
 def all_names() -> tuple[str, ...]:
     """Return the names of all statements, in reading order."""
-    return tuple(_statements())
+    return tuple(name for file in FILES for name in _texts(file))
 
 
 def block(name: str) -> Block:
@@ -93,29 +94,26 @@ def block(name: str) -> Block:
 
 def text_of(name: str) -> str:
     """Return the lines of a statement, without its name."""
-    if name not in _statements():
-        raise ArgumentError("name", name, one_of(name, _statements()))
-    return _statements()[name]
+    if name not in all_names():
+        raise ArgumentError("name", name, one_of(name, all_names()))
+    return next(_texts(file)[name] for file in FILES if name in _texts(file))
 
 
 def read(name: str, text: str) -> Block:
     """Return the block of these lines, with the letters that all statements share."""
-    return Block(name, tuple(_with_shared((*_entries(_texts(SHARED)["letters"]), *_entries(text)))))
-
-
-def _statements() -> dict[str, str]:
-    return {name: text for file in FILES for name, text in _texts(file).items()}
+    return Block(name, (*_entries(_texts("shared")["letters"]), *_entries(text)))
 
 
 @cache
 def _texts(file: str) -> dict[str, str]:
-    found: dict[str, list[str]] = {}
-    for line in (FOLDER / f"{file}.txt").read_text(encoding="utf-8").splitlines():
+    """Return the lines of each statement of a file by name."""
+    found: dict[str, str] = {}
+    for line in (FOLDER / f"{file}.txt").read_text(encoding="utf-8").splitlines(keepends=True):
         if line.strip() and not line.startswith(("#", " ")):
-            found[line.strip()] = []
+            found[line.strip()] = ""
         elif line.startswith(" "):
-            found[next(reversed(found))].append(line)
-    return {name: "\n".join(lines) for name, lines in found.items()}
+            found[next(reversed(found))] += line
+    return found
 
 
 def _entries(text: str) -> Iterator[Entry]:
@@ -128,19 +126,13 @@ def _entries(text: str) -> Iterator[Entry]:
     for key, _, rest in (line.partition(" ") for line in joined):
         if key not in _KEYS:
             raise ArgumentError("statement", key, one_of(key, sorted(_KEYS)))
-        if key in _PROSE:
+        if key == "use":
+            for name in rest.split(","):
+                yield from _entries(_texts("shared")[name.strip()])
+        elif key in _PROSE:
             yield Entry(key, "", rest.strip())
-            continue
-        rest, _, note = rest.partition(" -- ")
-        rest, _, case = rest.partition("@")
-        words, _, formula = rest.rpartition(" :: ")
-        yield Entry(key, words.strip(), formula.strip(), case.strip(), note.strip())
-
-
-def _with_shared(entries: Iterable[Entry]) -> Iterator[Entry]:
-    for entry in entries:
-        if entry.key == "use":
-            for name in entry.formula.split(","):
-                yield from _with_shared(_entries(_texts(SHARED)[name.strip()]))
         else:
-            yield entry
+            rest, _, note = rest.partition(" -- ")
+            rest, _, case = rest.partition("@")
+            words, _, formula = rest.rpartition(" :: ")
+            yield Entry(key, words.strip(), formula.strip(), case.strip(), note.strip())

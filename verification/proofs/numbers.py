@@ -6,17 +6,10 @@ import random
 from collections.abc import Callable
 from fractions import Fraction
 
+from flint import fmpq_mat
+
 from verification.proofs import by_sympy, layout
-from verification.proofs.cases import (
-    Case,
-    Comparison,
-    all_hold,
-    completed,
-    exact,
-    flint,
-    holds,
-    pseudo_inverse,
-)
+from verification.proofs.cases import Case, Comparison, all_hold, completed, holds, matrix_of, pseudo_inverse
 from verification.proofs.statement import Statement
 
 Comparisons = tuple[Comparison, ...]
@@ -38,8 +31,7 @@ def unequal_restitution() -> tuple[Comparisons, Twins]:
 
 
 def erratum_rank() -> tuple[Comparisons, Twins]:
-    rows = flint([[1], [1], [1]])
-    all_rows, left_over = rows.rank(), flint(exact(rows)[1:]).rank()
+    all_rows, left_over = (fmpq_mat([[1]] * count).rank() for count in (3, 2))
     return (_is("the rank of all three rows, so n = 1", all_rows, "=", 1),
             _is("the rank of the two rows left over", left_over, "=", 1)), (
                 ("as printed", _is("rank(J_r) = r", left_over, "=", 2), ""),)
@@ -139,14 +131,14 @@ def random_case(draw: random.Random) -> Case:
     def matrix(rows: int, columns: int) -> list[list[Fraction]]:
         return [[Fraction(draw.randint(-5, 5), draw.randint(1, 4)) for _ in range(columns)] for _ in range(rows)]
 
-    root, rows = flint(matrix(d, d)), matrix(c, d)
+    root, rows = matrix_of(matrix(d, d)), matrix(c, d)
     if c > 1:
         rows[-1] = [2 * entry for entry in rows[0]]
-    mass = root * root.transpose() + flint([[i == j for j in range(d)] for i in range(d)])
-    inverse, jacobian = mass.inv(), flint(rows)
-    return {"M": exact(mass), "M⁻¹": exact(inverse), "J": exact(jacobian), "v": exact(flint(matrix(d, 1))),
-            "G": exact(pseudo_inverse(jacobian * inverse * jacobian.transpose())),
-            "e": ((Fraction(draw.randint(-6, 6), 6),),)}  # fmt: skip
+    mass = root * root.transpose() + fmpq_mat([[int(i == j) for j in range(d)] for i in range(d)])
+    inverse, jacobian = mass.inv(), matrix_of(rows)
+    return {"M": mass, "M⁻¹": inverse, "J": jacobian, "v": matrix_of(matrix(d, 1)),
+            "G": pseudo_inverse(jacobian * inverse * jacobian.transpose()),
+            "e": matrix_of([[Fraction(draw.randint(-6, 6), 6)]])}
 
 
 def exact_instances() -> tuple[Comparisons, Twins]:
@@ -155,7 +147,7 @@ def exact_instances() -> tuple[Comparisons, Twins]:
     theorem = Statement(block)
     cases = [completed(random_case(draw), theorem.definitions) for _ in range(CASES)]
     shown, printed = [entry.formula for entry in block.all("show")], theorem.reader.fact(block.all("twin")[0].formula)
-    redundant = sum(flint(case["J"]).rank() < len(case["J"]) for case in cases)
+    redundant = sum(case["J"].rank() < case["J"].nrows() for case in cases)
     by_flint = sum(all_hold(theorem.conclusions, case) for case in cases)
     both = sum(all(by_sympy.holds(block, formula, case) for formula in shown) for case in cases[: CASES // 4])
     wrong = sum(holds(printed, case) for case in cases)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import time
-from functools import partial
-from itertools import starmap
 
 from verification.proofs import by_sympy, numbers
-from verification.proofs.cases import Comparison, all_hold, holds
+from verification.proofs.cases import all_hold, holds
 from verification.proofs.layout import Block, Entry
 from verification.proofs.show import (
     NO,
@@ -21,7 +19,7 @@ from verification.proofs.show import (
     step_lines,
 )
 from verification.proofs.statement import Statement, Task
-from verification.proofs.steps import Known, Refused, infer, prove, reasons
+from verification.proofs.steps import Known, Refused, infer, prove
 from verification.proofs.words import Fact
 
 
@@ -31,26 +29,28 @@ def checked(block: Block) -> ProofRecord:
     statement = Statement(block)
     known = Known([*statement.given, *statement.definitions])
     steps = [_checked(task, known) for task in statement.tasks]
-    comparisons, false_comparisons = numbers.BY_STATEMENT[block.name]() if block.all("numbers") else ((), ())
+    comparisons, false_ones = numbers.BY_STATEMENT[block.name]() if block.all("numbers") else ((), ())
     needed = tuple(_needed(entry, facts, statement) for entry, facts in statement.hypotheses)
-    twins = (*(_twin(entry, statement) for entry in block.all("twin")), *starmap(_false, false_comparisons))
+    twins = (*(_twin(entry, statement) for entry in block.all("twin")),
+             *(Refutation(title, number_line(*claim), (), note, not claim.is_true)
+               for title, claim, note in false_ones))  # fmt: skip
     second = by_sympy.refusal(block, [[line.text for line in step.certificate] for step in steps], comparisons)
     steps += [StepRecord(number_line(*each), refusal="" if each.is_true else f"'{each.says}' is false")
               for each in comparisons]  # fmt: skip
-    problems = (
-        *(f"step refused: {step.refusal}" for step in steps if not step.accepted),
-        *(f"not shown: {refutation.title}" for refutation in (*needed, *twins) if not refutation.refuted),
-        *([f"SymPy refuses a step: {second}"] if second else []),
-        *_loose_ends(statement, known, twins),
-    )
+    problems = [f"step refused: {step.refusal}" for step in steps if not step.accepted]
+    problems += [f"not shown: {refutation.title}" for refutation in (*needed, *twins) if not refutation.refuted]
+    problems += [f"SymPy refuses a step: {second}"] if second else []
+    problems += [f"hypothesis never used: {fact.name}" for fact in statement.given if fact.name not in known.used]
+    problems += [] if twins else ["no wrong twin"]
+    if statement.given and not all_hold([*statement.given, *statement.conclusions], statement.case("")):
+        problems.append("no exact case satisfies the hypotheses and the conclusions")
     (title,), (source,), (says,) = (block.prose(key) for key in ("title", "source", "says"))
     return ProofRecord(
         name=block.name, title=title, source=source, statement=says,
         hypotheses=tuple(map(fact_line, statement.given)), definitions=tuple(map(fact_line, statement.definitions)),
         steps=tuple(steps), conclusions=tuple(map(fact_line, statement.conclusions)), needed=needed, twins=twins,
         remarks=block.prose("remark"), assumed=block.prose("assumed"), measured=block.prose("measured"),
-        problems=problems, seconds=time.perf_counter() - started,
-        sympy=NO if second else YES,
+        problems=tuple(problems), seconds=time.perf_counter() - started, sympy=NO if second else YES,
     )  # fmt: skip
 
 
@@ -61,7 +61,7 @@ def _checked(task: Task, known: Known) -> StepRecord:
                 prove(task.claim, known, task.terms, task.cofactors))  # fmt: skip
     except Refused as error:
         return StepRecord(claim, because, refusal=str(error))
-    lines = step_lines(step, partial(reasons, known=known))
+    lines = step_lines(step, known)
     known.facts.append(step.claim)
     return StepRecord(claim, because, lines)
 
@@ -84,17 +84,3 @@ def _twin(entry: Entry, statement: Statement) -> Refutation:
     refuted = all_hold(statement.given, case) and not holds(claim, case) and not by_sympy.holds(
         statement.block, entry.formula, case)
     return Refutation(title, fact_line(claim), case_lines(case, statement.names), entry.note, refuted)
-
-
-def _false(title: str, claim: Comparison, note: str = "") -> Refutation:
-    return Refutation(title, number_line(*claim), (), note, not claim.is_true)
-
-
-def _loose_ends(statement: Statement, known: Known, twins: tuple[Refutation, ...]) -> list[str]:
-    """Return problems that weaken the theorem, such as unused or contradictory hypotheses."""
-    open_ends = [f"hypothesis never used: {fact.name}" for fact in statement.given if fact.name not in known.used]
-    if not twins:
-        open_ends.append("no wrong twin")
-    if statement.given and not all_hold([*statement.given, *statement.conclusions], statement.case("")):
-        open_ends.append("no exact case satisfies the hypotheses and the conclusions")
-    return open_ends

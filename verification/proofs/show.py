@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import groupby
 
 from verification.proofs.cases import Case
-from verification.proofs.steps import Factors, Step
+from verification.proofs.steps import Known, Step, reasons
 from verification.proofs.words import ANY, ONE, Expression, Fact
 
 YES, NO, NOT_APPLICABLE = "yes", "no", "not applicable"
@@ -115,7 +114,6 @@ _SYMBOLS = {
 _GREEK = {mark: latex for latex, mark in _SYMBOLS.items() if mark.isalpha() and not mark.isascii() and mark != "Σ"}
 _RAISED = {"⁻¹": "-1", "⁺": "+", "⁻": "-", "†": r"\dagger"}
 _LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉ₙₑₕₖₜₛᵣᵢ", "0123456789nehktsri", strict=True))
-_POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MARKS = {"ᵀ": r"\top", "²": "2", "³": "3", "⁴": "4"}
 _OPERATORS = {"+": "+", "−": "-", "=": "=", "≠": r"\neq", "<": "<", "≤": r"\leq", ">": ">", "≥": r"\geq",
               "⪰": r"\succeq", "≻": r"\succ"}  # fmt: skip
@@ -131,20 +129,6 @@ def plain(prose: str) -> str:
     for mark in sorted(_SYMBOLS, key=len, reverse=True):
         prose = prose.replace(mark, _SYMBOLS[mark])
     return re.sub(r"\\?[\${}]", "", prose)
-
-
-def text(value: Expression) -> str:
-    """Return an expression as text on one line, as a sum of terms that the reader reads again."""
-    pieces: list[str] = []
-    unit = [] if value.rows in (ANY, "1") else ["I"]  # a bare number among matrices is a multiple of the identity
-    for (scalars, word), coefficient in value.ordered():
-        counts = [(name, len(list(group))) for name, group in groupby(scalars)]
-        factors = [name + ("" if power == 1 else str(power).translate(_POWERS)) for name, power in counts]
-        factors += [each.name + "ᵀ" * each.flipped for each in word] or unit
-        number = [] if abs(coefficient) == 1 and factors else [str(abs(coefficient))]
-        sign = "−" if coefficient < 0 else "+" if pieces else ""
-        pieces.append((f" {sign} " if pieces else sign) + " ".join(number + factors))
-    return "".join(pieces) or "0"
 
 
 def latex(formula: str) -> str:
@@ -174,9 +158,7 @@ def _latex_part(chunk: str) -> str:
 
 def fact_line(fact: Fact) -> Line:
     """Return a fact as a line: its name in words and its formula."""
-    identity = fact.rhs == ONE and fact.lhs.rows not in (ANY, "1")  # then 1 stands for the identity matrix
-    return Line(f"{fact.name} (entry by entry)" if fact.entrywise else fact.name,
-                f"{text(fact.lhs)} {fact.relation} {'I' if identity else text(fact.rhs)}")  # fmt: skip
+    return Line(f"{fact.name} (entry by entry)" if fact.entrywise else fact.name, str(fact))
 
 
 def number_line(says: str, left: Fraction, relation: str, right: Fraction) -> Line:
@@ -187,33 +169,32 @@ def number_line(says: str, left: Fraction, relation: str, right: Fraction) -> Li
     return Line(says, f"{first} {relation} {second}")
 
 
-def step_lines(step: Step, reasons: Callable[[Factors], Iterable[Fact]]) -> tuple[Line, ...]:
-    """Return the certificate of a step, term by term; `reasons` gives the facts that make a term non-negative."""
+def step_lines(step: Step, known: Known) -> tuple[Line, ...]:
+    """Return the certificate of a step, term by term, with the facts that make a term non-negative or zero."""
     if step.sources:
         return (Line("from " + " and ".join(f"'{fact.name}'" for fact in step.sources)),)
     lines = []
     for factors in step.terms:
-        names = " and ".join(f"'{fact.name}'" for fact in reasons(factors))
-        lines.append(Line(f"non-negative by {names}" if names else "a square",
-                          " · ".join(_bracketed(text(factor)) for factor in factors)))  # fmt: skip
+        names = " and ".join(f"'{fact.name}'" for fact in reasons(factors, known))
+        lines.append(Line(f"non-negative by {names}" if names else "a square", " · ".join(map(_bracketed, factors))))
     for left, fact, right in step.cofactors:
-        one, other = fact_line(fact).text.split(" = ")
-        parts = [f"[{one} − {_bracketed(other)}]"]
-        parts = [_bracketed(text(left))] * (left != ONE) + parts + [_bracketed(text(right))] * (right != ONE)
+        one, other = str(fact).split(" = ")
+        parts = [*[_bracketed(left)] * (left != ONE), f"[{one} − {_bracketed(other)}]",
+                 *[_bracketed(right)] * (right != ONE)]  # fmt: skip
         lines.append(Line(f"by '{fact.name}'", " · ".join(parts)))
     return tuple(lines)
 
 
-def _bracketed(formula: str) -> str:
+def _bracketed(value: Expression | str) -> str:
     """Return the formula, in brackets if a sum or a sign could be misread without them."""
+    formula = str(value)
     return f"({formula})" if formula[0] == "−" or " + " in formula or " − " in formula else formula
 
 
 def case_lines(case: Case, names: Mapping[str, Expression]) -> tuple[Line, ...]:
     """Return an exact case as one line per letter."""
-    plain_rows = {name: "; ".join(" ".join(map(str, row)) for row in rows) for name, rows in case.items()}
-    return tuple(Line("", f"{name} = " + (rows if names[name].rows == ANY else f"[{rows}]"))
-                 for name, rows in plain_rows.items())  # fmt: skip
+    rows = {name: "; ".join(" ".join(map(str, row)) for row in value.tolist()) for name, value in case.items()}
+    return tuple(Line("", f"{name} = {row if names[name].rows == ANY else f'[{row}]'}") for name, row in rows.items())
 
 
 def _formula(line: Line) -> str:

@@ -8,7 +8,7 @@ from iapb.errors import ArgumentError
 from verification.proofs.cases import Case, completed, read_case
 from verification.proofs.layout import Block, Entry
 from verification.proofs.steps import Cofactor, Factors, Refused
-from verification.proofs.words import Expression, Fact, Reader, letter, names_in, product
+from verification.proofs.words import Expression, Fact, Product, Reader, letter, names_in, product
 
 _INFERENCES = {"cancelling": "cancel", "dividing": "divide", "dominating": "dominate"}
 
@@ -32,11 +32,11 @@ class Statement:
     """
 
     def __init__(self, block: Block) -> None:
-        self.block = block
-        names = {name: letter(name, *shape) for name, shape in block.shapes.items()}
+        self.block, self.cases = block, dict[str, Case]()
+        self.names = {name: letter(name, *shape) for name, shape in block.shapes.items()}
         for name, formula in block.abbreviations:
-            names[name] = Reader(names).expression(formula)
-        self.names, self.reader = names, Reader(names)
+            self.names[name] = Reader(self.names).expression(formula)
+        self.reader = Reader(self.names)
         self.hypotheses = [(entry, self._facts(entry)) for entry in block.all("given")]
         self.given = [fact for _, facts in self.hypotheses for fact in facts]
         self.definitions = [fact for entry in block.all("where") for fact in self._facts(entry)]
@@ -44,16 +44,15 @@ class Statement:
         for definition in self.definitions:
             new = names_in(definition.lhs)
             taken |= names_in(definition.rhs)
-            if len(new) != 1 or definition.lhs != names[min(new)] or new & taken:
+            if len(new) != 1 or definition.lhs != self.names[min(new)] or new & taken:
                 raise ArgumentError("where", definition.name, "one letter that its right side and earlier ones lack")
             taken |= new
         self.tasks: list[Task] = []
         for entry in block.all("lemma", "show", "sum", "by"):
             self._read_step(entry)
         self.conclusions = [task.claim for task in self.tasks if task.entry.key == "show"]
-        self.cases: dict[str, Case] = {}
         for entry in block.all("case"):
-            name, colon, values = entry.formula.rpartition(":")
+            name, _, values = entry.formula.rpartition(":")
             self.cases[name] = read_case(values, block.shapes)
 
     def case(self, text: str) -> Case:
@@ -76,11 +75,10 @@ class Statement:
             self.tasks[-1].terms += [tuple(x for x in term if isinstance(x, Expression)) for term in terms]
 
 
-def _cofactor(factors: tuple[Expression | Fact, ...]) -> Cofactor:
+def _cofactor(factors: Product) -> Cofactor:
+    """Return what stands left of the equation in square brackets, the equation, and what stands right of it."""
     at = [i for i, each in enumerate(factors) if isinstance(each, Fact)]
-    fact = factors[at[0]] if len(at) == 1 else None
-    if not isinstance(fact, Fact):
+    if len(at) != 1:
         raise Refused("a cofactor has one equation in square brackets")
-    left, right = (product(x for x in part if isinstance(x, Expression)) for part in (factors[: at[0]],
-                                                                                  factors[at[0] + 1 :]))
-    return left, fact, right
+    left, right = factors[: at[0]], factors[at[0] + 1 :]
+    return product(left), factors[at[0]], product(right)  # type: ignore[arg-type, return-value]

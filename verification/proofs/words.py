@@ -5,23 +5,24 @@ An `Expression` is a finite sum  coefficient * scalars * word.  A word is a prod
 only if they have the same terms; no simplifier, numeric size or sample is used. A product with unequal inner sizes
 raises an error, and so does a sum of different shapes.
 
-One rule goes beyond the free algebra: a 1 x 1 product equals its own transpose, so `canonical` brings words of that
-shape to one order.
+One rule goes beyond the free algebra: a 1 x 1 product equals its own transpose (`vanishes`).
 """
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, reduce
+from itertools import groupby
 from typing import NamedTuple
 
 from iapb.errors import ArgumentError
 
 ANY = "*"  # the size of a multiple of the identity, which fits every square shape
+_POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 
 
 class Letter(NamedTuple):
@@ -32,48 +33,41 @@ class Letter(NamedTuple):
     cols: str
     flipped: bool = False
 
-    @property
-    def transposed(self) -> Letter:
-        return Letter(self.name, self.cols, self.rows, not self.flipped)
-
 
 Word = tuple[Letter, ...]
 Scalars = tuple[str, ...]  # a commutative monomial: its factors sorted, each as often as it occurs
+Term = tuple[Scalars, Word]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Expression:
     """Sum of terms of one shape; `terms` maps (scalars, word) to a nonzero rational coefficient."""
 
-    terms: dict[tuple[Scalars, Word], Fraction]
+    terms: dict[Term, Fraction]
     rows: str = ANY
     cols: str = ANY
 
     def __add__(self, other: Expression) -> Expression:
-        total = defaultdict(Fraction, self.terms)
-        for term, coefficient in other.terms.items():
-            total[term] += coefficient
-        return Expression({t: k for t, k in total.items() if k}, *_common_shape(self, other))
+        shapes = {(part.rows, part.cols) for part in (self, other) if part.terms}
+        sized = shapes - {(ANY, ANY)}
+        if len(sized) > 1 or (len(shapes) > 1 and any(rows != cols for rows, cols in sized)):
+            raise ArgumentError("sum", f"{self.rows}x{self.cols} + {other.rows}x{other.cols}", "equal shapes")
+        return _collected([*self.terms.items(), *other.terms.items()], *next(iter(sized), (ANY, ANY)))
 
     def __mul__(self, other: Expression) -> Expression:
-        rows, cols = _product_shape(self, other)
-        total: defaultdict[tuple[Scalars, Word], Fraction] = defaultdict(Fraction)
-        for (scalars, word), k in self.terms.items():
-            for (more_scalars, more_word), factor in other.terms.items():
-                total[tuple(sorted(scalars + more_scalars)), word + more_word] += k * factor
-        return Expression({t: k for t, k in total.items() if k}, rows, cols)
+        if ANY not in (self.cols, other.rows) and self.cols != other.rows:
+            shapes = f"{self.rows}x{self.cols} times {other.rows}x{other.cols}"
+            raise ArgumentError("product", shapes, "inner sizes that agree")
+        terms = [((tuple(sorted(scalars + more)), word + next_word), k * factor)
+                 for (scalars, word), k in self.terms.items() for (more, next_word), factor in other.terms.items()]
+        return _collected(terms, other.rows if self.rows == ANY else self.rows,
+                          self.cols if other.cols == ANY else other.cols)
 
     def __neg__(self) -> Expression:
         return number(-1) * self
 
     def __sub__(self, other: Expression) -> Expression:
         return self + -other
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Expression) and other.terms == self.terms
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self.terms.items()))
 
     @cached_property
     def T(self) -> Expression:
@@ -87,14 +81,32 @@ class Expression:
 
     def vanishes(self) -> bool:
         """Whether it is zero in the free algebra, with 1 x 1 words equal to their transposes."""
-        total: defaultdict[tuple[Scalars, Word], Fraction] = defaultdict(Fraction)
-        for (scalars, word), k in self.terms.items():
-            total[scalars, min(word, transposed(word)) if self.rows == self.cols == "1" else word] += k
-        return not any(total.values())
+        return not (self + self.T if self.rows == self.cols == "1" else self).terms
 
-    def ordered(self) -> Iterator[tuple[tuple[Scalars, Word], Fraction]]:
+    def ordered(self) -> list[tuple[Term, Fraction]]:
         """Return the terms in a fixed order, short words first."""
-        return iter(sorted(self.terms.items(), key=lambda item: (len(item[0][1]), item[0][0], item[0][1])))
+        return sorted(self.terms.items(), key=lambda item: (len(item[0][1]), item[0][0], item[0][1]))
+
+    def __str__(self) -> str:
+        """Return the sum as text on one line, which the reader reads again."""
+        pieces: list[str] = []
+        unit = [] if self.rows in (ANY, "1") else ["I"]  # a bare number among matrices is a multiple of the identity
+        for (scalars, word), coefficient in self.ordered():
+            counts = [(name, len(list(group))) for name, group in groupby(scalars)]
+            factors = [name + ("" if power == 1 else "".join(_POWERS[int(digit)] for digit in str(power)))
+                       for name, power in counts]
+            factors += [each.name + "ᵀ" * each.flipped for each in word] or unit
+            size = [] if abs(coefficient) == 1 and factors else [str(abs(coefficient))]
+            sign = "−" if coefficient < 0 else "+" if pieces else ""
+            pieces.append((f" {sign} " if pieces else sign) + " ".join(size + factors))
+        return "".join(pieces) or "0"
+
+
+def _collected(terms: Iterable[tuple[Term, Fraction]], rows: str, cols: str) -> Expression:
+    total: defaultdict[Term, Fraction] = defaultdict(Fraction)
+    for term, coefficient in terms:
+        total[term] += coefficient
+    return Expression({term: k for term, k in total.items() if k}, rows, cols)
 
 
 def number(value: Fraction | int) -> Expression:
@@ -107,7 +119,7 @@ ONE = number(1)
 
 def letter(name: str, rows: str = ANY, cols: str = ANY) -> Expression:
     """Return a letter of shape rows x cols, or a commuting scalar if no sizes are given."""
-    return Expression({((name,), ()): Fraction(1)}) if rows == ANY else of_word((Letter(name, rows, cols),))
+    return of_word((), (name,)) if rows == ANY else of_word((Letter(name, rows, cols),))
 
 
 def of_word(word: Word, scalars: Scalars = (), coefficient: Fraction = Fraction(1)) -> Expression:
@@ -116,33 +128,18 @@ def of_word(word: Word, scalars: Scalars = (), coefficient: Fraction = Fraction(
 
 
 def product(factors: Iterable[Expression]) -> Expression:
+    """Return the product of the factors, in their order."""
     return reduce(Expression.__mul__, factors, ONE)
 
 
 def transposed(word: Word) -> Word:
-    return tuple(each.transposed for each in reversed(word))
+    """Return the word reversed, with every letter flipped."""
+    return tuple(Letter(each.name, each.cols, each.rows, not each.flipped) for each in reversed(word))
 
 
 def names_in(value: Expression) -> set[str]:
     """Return the names of all letters and scalars in the expression."""
     return {name for scalars, word in value.terms for name in (*scalars, *(each.name for each in word))}
-
-
-def _product_shape(left: Expression, right: Expression) -> tuple[str, str]:
-    if left.cols == ANY:
-        return right.rows, right.cols
-    if right.rows != ANY and left.cols != right.rows:
-        shapes = f"{left.rows}x{left.cols} times {right.rows}x{right.cols}"
-        raise ArgumentError("product", shapes, "inner sizes that agree")
-    return left.rows, left.cols if right.rows == ANY else right.cols
-
-
-def _common_shape(left: Expression, right: Expression) -> tuple[str, str]:
-    shapes = [(part.rows, part.cols) for part in (left, right) if part.rows != ANY]
-    lone_identity = len(shapes) == 1 and shapes[0][0] != shapes[0][1] and left.terms and right.terms
-    if len(set(shapes)) > 1 or lone_identity:
-        raise ArgumentError("sum", f"{left.rows}x{left.cols} + {right.rows}x{right.cols}", "equal shapes")
-    return shapes[0] if shapes else (ANY, ANY)
 
 
 @dataclass(frozen=True)
@@ -171,10 +168,14 @@ class Fact:
     def entrywise(self) -> bool:
         return self.relation == "≥" and not self.difference.is_number
 
+    def __str__(self) -> str:
+        identity = self.rhs == ONE and self.lhs.rows not in (ANY, "1")  # then 1 stands for the identity matrix
+        return f"{self.lhs} {self.relation} {'I' if identity else self.rhs}"
+
 
 _RELATION = re.compile(r"\s*([=≠≤≥⪯⪰≻])\s*")
-_POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 _SIGNS, _ENDS = {"+": 1, "−": -1, "-": -1}, (")", "]", "=", "")
+Product = tuple[Expression | Fact, ...]
 
 
 class Reader:
@@ -189,6 +190,7 @@ class Reader:
         self._token = re.compile(rf"\s*({words}|\d+(?:/\d+)?|\S)")
 
     def expression(self, text: str) -> Expression:
+        """Return the value of a sum."""
         return _total(self.products(text))
 
     def fact(self, text: str, name: str = "") -> Fact:
@@ -204,13 +206,13 @@ class Reader:
             raise ArgumentError("formula", text, "a square matrix")
         return Fact(name or text.strip(), left, relation, right)
 
-    def products(self, text: str) -> list[tuple[Expression | Fact, ...]]:
+    def products(self, text: str) -> list[Product]:
         """Return the terms of a sum, each as the factors of its product."""
         return self._sum(deque([*self._token.findall(text), ""]), "")
 
-    def _sum(self, tokens: deque[str], end: str) -> list[tuple[Expression | Fact, ...]]:
+    def _sum(self, tokens: deque[str], end: str) -> list[Product]:
         """Read up to the token `end`."""
-        found: list[tuple[Expression | Fact, ...]] = []
+        found: list[Product] = []
         while True:
             sign = _SIGNS[tokens.popleft()] if tokens[0] in _SIGNS else 0
             factors: list[Expression | Fact] = []
@@ -218,7 +220,7 @@ class Reader:
                 factors += self._factor(tokens)
             if not factors or (found and not sign):
                 raise ArgumentError("formula", tokens[0], "a sum of products")
-            found.append((*([-ONE] if sign < 0 else []), *factors))
+            found.append((*[-ONE] * (sign < 0), *factors))
             if tokens[0] in _ENDS:
                 if (token := tokens.popleft()) != end:
                     raise ArgumentError("formula", token, f"{end or 'the end'} there")
@@ -243,6 +245,6 @@ class Reader:
         return [value] * times
 
 
-def _total(products: Iterable[tuple[Expression | Fact, ...]]) -> Expression:
+def _total(products: Iterable[Product]) -> Expression:
     parts = (product(x.difference if isinstance(x, Fact) else x for x in factors) for factors in products)
     return reduce(Expression.__add__, parts)

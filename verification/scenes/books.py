@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,11 @@ from iapb.scene.mechanism import mechanism_of
 Floats = NDArray[np.float64]
 Book = Mapping[str, float]
 
-REFINEMENTS = (1, 2, 4)  # divisors of the scene's step
 ROUNDING = 1e-12  # share of the total energy that bounds the rounding of some thousand sums in double precision
 ORDER_SLACK = 0.25  # tolerance below the declared order, because collision times change with the step
 OPEN_SHARE, GAIN_SHARE = "residual by size, share of the energy exchanged", "most energy beyond what was put in"
+WORTH_NAMING = 1.0  # [%] of the energy exchanged; scenes with a larger energy residual are listed
+OPEN = "residual at the scene's step"
 _HELD = ("kinetic", "potential", "in contact springs")
 
 
@@ -92,71 +93,60 @@ def total(book: Book, when: str) -> float:
     return sum(book[f"{name}, {when}"] for name in _HELD)
 
 
-def is_rounding(book: Book) -> bool:
-    """Whether the energy residual is at most the rounding of the energies."""
-    scale = max(abs(total(book, "start")), abs(total(book, "end")), book["energy exchanged"])
-    return left_open(book) <= ROUNDING * scale
+def rounding_of(book: Book) -> float:
+    """Return the rounding of the energies [J]."""
+    return ROUNDING * max(abs(total(book, "start")), abs(total(book, "end")), book["energy exchanged"])
 
 
-@dataclass(frozen=True)
-class OpenBooks:
-    """Energy residuals of a scene at decreasing steps.
-
-    step : the scene's own step [s]; refinements : divisors of this step
-    open_shares : energy residual at each refinement, as a share of the energy exchanged
-    order : measured order of the residual; None if the residual is rounding
-    """
-
-    scene: str
-    step: float
-    refinements: tuple[int, ...]
-    open_shares: tuple[float, ...]
-    declared_order: int
-    order: float | None
-
-    @property
-    def falls_as_declared(self) -> bool:
-        """Whether the residual is rounding or falls at least with the declared order."""
-        return as_declared(self.order, self.declared_order)
-
-    def step_for(self, wanted: float) -> float | None:
-        """Return a step [s] whose residual is at most the share `wanted`: a tested step or one from the measured order.
-        """
-        for factor, found in zip(self.refinements, self.open_shares, strict=True):
-            if found <= wanted:
-                return self.step / factor
-        if self.order is None or self.order <= 0.0:
-            return None
-        return self.step / self.refinements[-1] * (wanted / self.open_shares[-1]) ** (1.0 / self.order)
+def as_declared(row: Mapping[str, Any]) -> bool:
+    """Whether the measured order in a row is at least the declared one; rounding has no order."""
+    return row["order measured"] is None or bool(row["order measured"] >= row["order declared"] - ORDER_SLACK)
 
 
-def as_declared(order: float | None, declared: int) -> bool:
-    """Whether a measured order is at least the declared one; None is the order of rounding."""
-    return order is None or order >= declared - ORDER_SLACK
+def open_row(scene: Scene, simulate: Callable[[Scene], Run], refinements: Sequence[int]) -> dict[str, Any]:
+    """Run a scene at decreasing steps, until rounding is all that is left, and return the row of its energy residuals.
 
-
-def measured_order(first: float, last: float, refinement: float) -> float:
-    """Return p if the error falls as step^p from `first` to `last` when the step is divided by `refinement`."""
-    return math.log(first / last) / math.log(refinement) if last > 0.0 else math.inf
-
-
-def open_books(
-    scene: Scene, simulate: Callable[[Scene], Run], refinements: Sequence[int] = REFINEMENTS
-) -> OpenBooks:
-    """Run a scene at decreasing steps and return its energy residuals.
-
-    simulate : returns the run of a scene in any world
+    simulate : returns the run of a scene in any world; refinements : divisors of the scene's step
     """
     books: list[dict[str, float]] = []
     for factor in refinements:
         run = simulate(scene.with_values({"rate": scene.rate * factor}))
         books.append(energy_book(run))
-        if is_rounding(books[-1]):
+        if left_open(books[-1]) <= rounding_of(books[-1]):
             break
-    done = tuple(refinements[: len(books)])
-    falls = None if len(done) < 2 else measured_order(left_open(books[0]), left_open(books[-1]), done[-1] / done[0])
-    return OpenBooks(scene.name, 1.0 / scene.rate, done, tuple(book[OPEN_SHARE] / 100 for book in books),
-                     INTEGRATORS[run.law_settings["integrator"]].order, falls)
+    first, last = left_open(books[0]), left_open(books[-1])
+    order = None
+    if len(books) > 1:  # the error falls as step^order
+        order = math.log(first / last) / math.log(refinements[len(books) - 1] / refinements[0]) if last else math.inf
+    shares = dict(zip(refinements, (book[OPEN_SHARE] / 100 for book in books), strict=False))
+    declared = INTEGRATORS[run.law_settings["integrator"]].order
+    return residual_row(scene.name, 1.0 / scene.rate, dict.fromkeys(refinements) | shares, declared, order)
+
+
+def residual_row(
+    scene: str, step: float, shares: Mapping[int, float | None], declared: int, order: float | None
+) -> dict[str, Any]:
+    """Return the row of residuals, shares of the energy exchanged, by the divisor of the scene's step [s]; None if that
+    step was not tried."""
+    found = step_for(WORTH_NAMING / 100, step, shares, order)
+    return {
+        "scene": scene, **{f"{OPEN} [%]" if k == 1 else f"at 1/{k} of this step [%]":
+                           None if share is None else 100 * share for k, share in shares.items()},
+        "order declared": declared, "order measured": order, "the scene's step [ms]": 1e3 * step,
+        f"step for a residual of {WORTH_NAMING:g} % [ms]": None if found is None else 1e3 * found,
+    }  # fmt: skip
+
+
+def step_for(wanted: float, step: float, shares: Mapping[int, float | None], order: float | None) -> float | None:
+    """Return a step [s] whose residual is at most the share `wanted`: a tested step or one from the measured order."""
+    tried = [(factor, share) for factor, share in shares.items() if share is not None]
+    for factor, share in tried:
+        if share <= wanted:
+            return step / factor
+    if order is None or order <= 0.0:
+        return None
+    factor, share = tried[-1]
+    return step / factor * (wanted / share) ** (1.0 / order)
 
 
 def contact_energy(run: Run, scene: Scene) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,15 +13,16 @@ from verification.check import Check, Study, Topic
 from verification.finding import MIXED, REFUTED, REPRODUCED, Part
 from verification.scenes.books import (
     GAIN_SHARE,
+    OPEN,
     OPEN_SHARE,
     ROUNDING,
-    OpenBooks,
+    WORTH_NAMING,
     as_declared,
     energy_book,
     energy_series,
-    open_books,
+    open_row,
+    rounding_of,
     scene_of,
-    total,
     turned_over,
 )
 from verification.table import Row, Table
@@ -36,10 +37,7 @@ LAST_PART = 0.1  # share of the run, at its end, in which the scene must be at r
 RESTS, SETTLES, MOVES, STOPPED = "stays at rest", "comes to rest", "keeps moving", "stopped: "
 
 DEEP = 0.5  # penetration, as a share of the thinnest moving shape, from which contacts push to the wrong side
-WORTH_NAMING = 1.0  # [%] of the energy exchanged; scenes with a larger energy residual are listed
 _ADDED = "most energy added by an impact, share of the energy exchanged"
-_OPEN = "residual at the scene's step"
-_STEP_FOR = f"step for a residual of {WORTH_NAMING:g} % [ms]"
 
 
 def _run(study: Study, name: str) -> Run:
@@ -120,7 +118,7 @@ def book_row(run: Run) -> dict[str, Any]:
 def _of_books(table: Table) -> Part:
     """Return the part on whether the stored energy ever exceeds the energy at the start plus the work done."""
     rows = table.records()
-    made = sorted((row for row in rows if row[GAIN_SHARE] > 100 * max(ROUNDING, _floor(row))),
+    made = sorted((row for row in rows if row[GAIN_SHARE] * row["energy exchanged"] > 100 * rounding_of(row)),
                   key=lambda row: float(row[GAIN_SHARE]), reverse=True)
     if not made:
         return Part("In no scene does the stored energy ever exceed the energy at the start plus the work done on it.",
@@ -132,28 +130,11 @@ def _of_books(table: Table) -> Part:
         f"exchanged: {words}. Time stepping creates this energy, not the impacts.", MIXED)
 
 
-def _floor(row: Row) -> float:
-    """Return the rounding error of the total energy as a share of the energy exchanged."""
-    held = max(abs(total(row, "start")), abs(total(row, "end")))
-    return ROUNDING * held / row["energy exchanged"] if row["energy exchanged"] else np.inf
-
-
-def open_row(books: OpenBooks, refinements: Iterable[int]) -> dict[str, Any]:
-    """Return the energy residuals at decreasing steps, their order, and the step at which they fall to WORTH_NAMING."""
-    shares, step = dict(zip(books.refinements, books.open_shares, strict=True)), books.step_for(WORTH_NAMING / 100)
-    return {
-        "scene": books.scene, **{f"{_OPEN} [%]" if k == 1 else f"at 1/{k} of this step [%]":
-                                 100 * shares[k] if k in shares else None for k in refinements},
-        "order declared": books.declared_order, "order measured": books.order,
-        "the scene's step [ms]": 1e3 * books.step, _STEP_FOR: None if step is None else 1e3 * step,
-    }
-
-
 def _of_residuals(table: Table) -> Iterator[Part]:
     """Yield the parts on the order of the residuals and on their size. Both channels are added by size."""
     rows = table.records()
     tried = [row for row in rows if row["order measured"] is not None]
-    short = [row for row in tried if not as_declared(row["order measured"], row["order declared"])]
+    short = [row for row in tried if not as_declared(row)]
     orders = sorted(float(row["order measured"]) for row in tried)
     below = ", ".join(f"{row['scene']} ({row['order measured']:.2f})" for row in short)
     yield Part(
@@ -162,16 +143,16 @@ def _of_residuals(table: Table) -> Iterator[Part]:
         f"{orders[-1]:.2f} (median {float(np.median(orders)):.2f}); the integrator declares order "
         f"{max(row['order declared'] for row in tried)}."
         + (f" Below the declared order: {below}." if short else ""), MIXED if short else REPRODUCED)
-    wide = sorted((row for row in rows if row[_OPEN] > WORTH_NAMING), key=lambda row: float(row[_OPEN]), reverse=True)
+    wide = sorted((row for row in rows if row[OPEN] > WORTH_NAMING), key=lambda row: float(row[OPEN]), reverse=True)
     if not wide:
         yield Part(f"No residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged at the scene's own time step.",
                    REPRODUCED)
         return
-    said = ", ".join(f"{row['scene']} {row[_OPEN]:.1f} %" for row in wide)
+    said = ", ".join(f"{row['scene']} {row[OPEN]:.1f} %" for row in wide)
     yield Part(
         f"At the scene's own time step the residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged in "
         f"{len(wide)} of {len(rows)} scenes (absolute values of motion and springs added): {said}.", MIXED,
-        miss=f"time stepping leaves up to {wide[0][_OPEN]:.1f} % of a scene's energy unaccounted for "
+        miss=f"time stepping leaves up to {wide[0][OPEN]:.1f} % of a scene's energy unaccounted for "
              f"({wide[0]['scene']})")
 
 
@@ -186,10 +167,7 @@ def over_time(run: Run) -> Iterator[Row]:
 
 
 def _open(study: Study, name: str) -> Row:
-    def run(scene: Any) -> Run:
-        return study.run(scene, WORLD, keep=False)
-
-    return open_row(open_books(study.scene(name), run, REFINEMENTS[study.depth]), REFINEMENTS[study.depth])
+    return open_row(study.scene(name), lambda scene: study.run(scene, WORLD, keep=False), REFINEMENTS[study.depth])
 
 
 CONTACTS = Check(
@@ -222,13 +200,13 @@ OVER_TIME = Check(
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     contacts, residuals = tables["contact"].records(), tables["what the books leave open"].records()
-    deepest, widest = _most(contacts, "most penetration"), _most(residuals, _OPEN)
-    falls = sum(as_declared(row["order measured"], row["order declared"]) for row in residuals)
+    deepest, widest = _most(contacts, "most penetration"), _most(residuals, OPEN)
+    falls = sum(as_declared(row) for row in residuals)
     return (
         f"{len(contacts)} scenes, {sum(row['dimensions'] == 3 for row in contacts)} of them in space: bodies overlap "
         f"by at most {deepest['most penetration']:.2f} mm. The residual of the energy balance is rounding or falls "
         f"with the integrator's order in {falls} scenes; at the scene's own time step it is at most "
-        f"{widest[_OPEN]:.1f} % of the energy exchanged ({widest['scene']})."
+        f"{widest[OPEN]:.1f} % of the energy exchanged ({widest['scene']})."
     )
 
 

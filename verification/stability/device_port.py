@@ -128,15 +128,11 @@ def actuator_forces(loop: DeviceLoop, positions: Floats) -> Floats:
     return device.held_forces(loop.delay)
 
 
-def entered_energy(positions: Floats, forces: Floats, device_damping: float, dt: float) -> Floats:
-    """Return the least energy (n,) [J] that the hand has supplied by the end of each step."""
-    change = np.diff(positions)
-    return np.asarray(np.cumsum(-forces * change + device_damping * change**2 / dt))
-
-
 def leaked(positions: Floats, forces: Floats, device_damping: float, dt: float) -> float:
     """Return the largest net energy [J] that the hand has drawn by the end of a step; 0 if it never draws any."""
-    return max(0.0, -float(np.min(entered_energy(positions, forces, device_damping, dt))))
+    change = np.diff(positions)
+    supplied = np.cumsum(-forces * change + device_damping * change**2 / dt)  # by the hand, at least
+    return max(0.0, -float(np.min(supplied)))
 
 
 def needed_damping(positions: Floats, forces: Floats, dt: float) -> float:

@@ -12,24 +12,21 @@ from verification.finding import MIXED, REFUTED, REPRODUCED, Part
 from verification.stability.device_port import PORT
 from verification.stability.peg import PEG, PULSES
 from verification.stability.walls import (
-    BOUNCES_ON,
     GRIDS,
     GROWS,
     LAWS,
     PAPER_DAMPING,
     SETTLES,
+    Contact,
     Loop,
-    StabilityMap,
     grid,
     loops,
     maps_of,
 )
 from verification.table import Row, Table
 
-MARKS = {SETTLES: "+", BOUNCES_ON: "o", GROWS: "x"}
 
-
-def _maps(study: Study, loop: Loop) -> tuple[StabilityMap, StabilityMap]:
+def _maps(study: Study, loop: Loop) -> tuple[Contact, Contact]:
     return study.once(loop, lambda: maps_of(loop, *grid(study.depth)))
 
 
@@ -40,9 +37,9 @@ def _loop(loop: Loop) -> Row:
 
 def _marks(study: Study, loop: Loop) -> Iterator[Row]:
     """Yield a row per stiffness, with one mark per damping for its outcome."""
-    both = _maps(study, loop)
-    for i, K in enumerate(both[0].stiffness):
-        marks = ["".join(MARKS[outcome] for outcome in one.outcomes[i :: len(one.stiffness)]) for one in both]
+    both = [one.outcomes for one in _maps(study, loop)]
+    for i, K in enumerate(grid(study.depth)[0]):
+        marks = ["".join(one[:, i]) for one in both]
         yield {**_loop(loop), "stiffness [N/m]": float(K),
                "passive up to [N s/m]": max(float(loop.passive_damping(K)), 0.0),
                "penalties": marks[0], "impulses": marks[1]}
@@ -51,18 +48,18 @@ def _marks(study: Study, loop: Loop) -> Iterator[Row]:
 def _of_maps(table: Table) -> Iterator[Part]:
     """Yield the parts on stable walls, on the condition b >= KT/2 + |B|, and on a device without damping."""
     theirs, ours = (np.array([list(marks) for marks in table.column(law)]) for law in ("penalties", "impulses"))
-    yield _held(table, theirs == "+", ours == "+")
+    yield _held(table, theirs == SETTLES, ours == SETTLES)
     rate, b, K = (np.array(table.column(key)) for key in ("rate", "device damping", "stiffness"))
     ideal = np.array(table.column("sensors")) == "ideal"
     damping = next(grid(depth)[1] for depth in GRIDS if GRIDS[depth][1] == theirs.shape[1])
     passive = (b - 0.5 * K * (1.0 / rate))[:, None] >= damping
     damped, bare = ideal & (b > 0.0), ideal & (b == 0.0)
-    gains = int((passive & (theirs == "x"))[damped].sum())
+    gains = int((passive & (theirs == GROWS))[damped].sum())
     yield Part(
         f"Where b >= KT/2 + |B| holds, no wall may accelerate the hand: {gains} of {passive[damped].sum()} do. With "
-        f"this hand {(~passive & (theirs == '+'))[damped].sum()} walls outside the condition settle as well, because "
-        "the condition covers every hand.", REFUTED if gains else REPRODUCED)
-    shares = ", ".join(f"{100 * (theirs == '+')[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
+        f"this hand {(~passive & (theirs == SETTLES))[damped].sum()} walls outside the condition settle as well, "
+        "because the condition covers every hand.", REFUTED if gains else REPRODUCED)
+    shares = ", ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
                        for one in dict.fromkeys(rate[bare].tolist()))
     yield Part(
         "The paper's device has no damping, b = 0. By the condition no wall is then passive for every hand. With this "
@@ -84,15 +81,16 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray) -> Part:
 
 def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
     """Yield a row per law and stiffness at the paper's damping."""
-    for one in _maps(study, loop):
-        contact, at = one.contact, one.at(PAPER_DAMPING)
-        columns = (contact.rate_hardness, contact.settling_time, contact.penetration, contact.bounces,
-                   contact.peak_force)
-        for K, *values in zip(one.stiffness, *(column[at] for column in columns), strict=True):
-            hardness, settling, depth, bounces, peak = map(float, values)
-            yield {**_loop(loop), "law": one.law, "stiffness [N/m]": float(K), "rate-hardness [N/m]": hardness,
-                   "settles after [s]": settling if math.isfinite(settling) else None, "penetration [mm]": 1e3 * depth,
-                   "bounces": int(bounces), "peak force [N]": peak}
+    stiffness, damping = grid(study.depth)
+    at = int(np.flatnonzero(damping == PAPER_DAMPING)[0])
+    for law, one in zip(LAWS, _maps(study, loop), strict=True):
+        for i, K in enumerate(stiffness):
+            settling = float(one.settling_time[at, i])
+            yield {**_loop(loop), "law": law, "stiffness [N/m]": float(K),
+                   "rate-hardness [N/m]": float(one.rate_hardness[at, i]),
+                   "settles after [s]": settling if math.isfinite(settling) else None,
+                   "penetration [mm]": 1e3 * float(one.penetration[at, i]), "bounces": int(one.bounces[at, i]),
+                   "peak force [N]": float(one.peak_force[at, i])}
 
 
 def _hard(table: Table) -> Part:

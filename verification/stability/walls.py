@@ -10,17 +10,13 @@ p = (1 + e) m γ⁻, applied as the force p/T over one step; the following readi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.errors import ArgumentError
-from iapb.names import one_of
-
 Floats = NDArray[np.float64]
 PENALTY, IMPULSES = LAWS = ("penalty", "impulses")
-SETTLES, BOUNCES_ON, GROWS = "settles", "bounces on", "grows"
+SETTLES, BOUNCES_ON, GROWS = "+", "o", "x"  # the marks of a wall: the mass settles, keeps bouncing, moves ever more
 PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 
 SETTLED_SPEED = 1e-3  # [m/s] as in the claims: a hundredth of the speed at contact
@@ -67,10 +63,10 @@ class Loop:
 
 @dataclass(frozen=True)
 class Contact:
-    """Outcome at each wall (one entry per wall).
+    """Outcome at each wall; every array has the shape of the walls.
 
     settled : whether the mass is still in the last quarter of the time and has not grown
-    settling_time : time from the first contact [s], infinite if the mass never settles
+    settling_time : time from the first contact to the last motion [s], infinite if the mass still moves at the end
     grown : whether the mass exceeds GROWN times its initial speed later than 1 s after the first contact at any wall
     bounces : number of times that the mass leaves the wall
     penetration : largest penetration [m]; peak_force : largest force [N]
@@ -85,29 +81,32 @@ class Contact:
     rate_hardness: Floats
     peak_force: Floats
 
+    @property
+    def outcomes(self) -> NDArray[np.str_]:
+        """SETTLES, BOUNCES_ON or GROWS for each wall."""
+        return np.where(self.grown, GROWS, np.where(self.settled, SETTLES, BOUNCES_ON))
+
+    @property
+    def settles_after(self) -> Floats:
+        """Settling time [s]; infinite if the mass does not settle."""
+        return np.where(self.settled, self.settling_time, np.inf)
+
 
 def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Contact:
-    """Push the mass into each wall (n,) and return the outcomes.
+    """Push the mass into each wall and return the outcomes.
 
     Parameters
     ----------
-    stiffness : (n,) K [N/m]; damping : (n,) B [N s/m]
+    stiffness, damping : K [N/m] and B [N s/m] of the walls, in shapes that broadcast
     law : "penalty" or "impulses"
-
-    Raises
-    ------
-    ArgumentError
-        An unknown law.
     """
-    if law not in LAWS:
-        raise ArgumentError("law", law, one_of(law, LAWS))
-    K, B, r = np.asarray(stiffness, float), np.asarray(damping, float), loop.resolution
+    (K, B), r = np.broadcast_arrays(stiffness, damping), loop.resolution
     steps = round(loop.seconds * loop.rate)
-    x, v = np.full(len(K), -loop.distance), np.full(len(K), loop.speed)
+    x, v = np.full(K.shape, -loop.distance), np.full(K.shape, loop.speed)
     first = np.round(x / r) * r if r > 0.0 else x.copy()
     readings = [first - loop.speed * loop.step, *[first] * (loop.delay + 1)]  # those that are delayed, oldest first
-    commands = [np.zeros(len(K)) for _ in range(loop.delay)]
-    positions, speeds, forces = (np.empty((steps, len(K))) for _ in range(3))
+    commands = [np.zeros(K.shape) for _ in range(loop.delay)]
+    positions, speeds, forces = (np.empty((steps, *K.shape)) for _ in range(3))
     free, moved, held = _held_force(loop)
     for k in range(steps):
         readings = [*readings[1:], np.round(x / r) * r if r > 0.0 else x.copy()]
@@ -137,62 +136,18 @@ def _held_force(loop: Loop) -> tuple[float, float, float]:
 
 
 def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> Contact:
-    steps, count = positions.shape
+    steps = len(positions)
     time = loop.step * np.arange(1, steps + 1)
     inside = positions > 0.0
     first = np.where(inside.any(axis=0), inside.argmax(axis=0), steps - 1)
     moving = np.abs(speeds) > SETTLED_SPEED
     last_moving = np.where(moving.any(axis=0), steps - 1 - moving[::-1].argmax(axis=0), 0)
     settled = last_moving < (1.0 - _LAST) * steps
-    late = time > time[first][None].min() + 1.0
-    grown = (np.abs(speeds[late]) > GROWN * loop.speed).any(axis=0)
+    grown = (np.abs(speeds[time > time[first].min() + 1.0]) > GROWN * loop.speed).any(axis=0)
     left = (inside[:-1] & ~inside[1:]).sum(axis=0)
-    columns: Any = np.arange(count)
-    hardness = forces[(forces > 0.0).argmax(axis=0), columns] / loop.step / loop.speed
+    first_force = np.take_along_axis(forces, (forces > 0.0).argmax(axis=0)[None], axis=0)[0]
     return Contact(settled & ~grown, np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf), grown,
-                   left.astype(np.int64), positions.max(axis=0, initial=0.0), hardness, forces.max(axis=0))
-
-
-@dataclass(frozen=True)
-class StabilityMap:
-    """Outcomes of a grid of walls for one loop and one law.
-
-    stiffness : (k,) [N/m]; damping : (m,) [N s/m], 0 first
-    contact : outcomes; each array has shape (m k,), and the stiffness varies fastest
-    """
-
-    loop: Loop
-    law: str
-    stiffness: Floats
-    damping: Floats
-    contact: Contact
-
-    @property
-    def outcomes(self) -> tuple[str, ...]:
-        """SETTLES, BOUNCES_ON or GROWS for each wall."""
-        return tuple(GROWS if grown else SETTLES if settled else BOUNCES_ON
-                     for settled, grown in zip(self.contact.settled, self.contact.grown, strict=True))
-
-    @property
-    def passive(self) -> NDArray[np.bool_]:
-        """Whether each wall (m k,) satisfies the condition b >= KT/2 + |B|."""
-        K, B = walls(self.stiffness, self.damping)
-        return np.asarray(self.loop.passive_damping(K) >= B)
-
-    def at(self, damping: float) -> slice:
-        """Return the places of the walls with one of the dampings."""
-        row, size = int(np.flatnonzero(self.damping == damping)[0]), len(self.stiffness)
-        return slice(row * size, (row + 1) * size)
-
-    def settling(self, damping: float) -> Floats:
-        """Settling times (k,) at one of the dampings [s]."""
-        return np.where(self.contact.settled, self.contact.settling_time, np.inf)[self.at(damping)]
-
-
-def walls(stiffness: Floats, damping: Floats) -> tuple[Floats, Floats]:
-    """Return stiffness and damping of all pairs, each (m k,); the stiffness varies fastest."""
-    B, K = np.meshgrid(damping, stiffness, indexing="ij")
-    return K.ravel(), B.ravel()
+                   left, positions.max(axis=0, initial=0.0), first_force / loop.step / loop.speed, forces.max(axis=0))
 
 
 def loops() -> tuple[Loop, ...]:
@@ -211,8 +166,7 @@ def grid(depth: str) -> tuple[Floats, Floats]:
     return np.geomspace(1e2, 1e6, stiffnesses), np.sort(damping)
 
 
-def maps_of(loop: Loop, stiffness: Floats, damping: Floats) -> tuple[StabilityMap, StabilityMap]:
-    """Return the maps of a loop with penalties and with impulses, on the same walls."""
-    K, B = walls(stiffness, damping)
-    penalty, impulses = (StabilityMap(loop, law, stiffness, damping, touch_walls(loop, K, B, law)) for law in LAWS)
+def maps_of(loop: Loop, stiffness: Floats, damping: Floats) -> tuple[Contact, Contact]:
+    """Return the outcomes (m, k) with penalties and with impulses at m dampings and k stiffnesses."""
+    penalty, impulses = (touch_walls(loop, stiffness, damping[:, None], law) for law in LAWS)
     return penalty, impulses

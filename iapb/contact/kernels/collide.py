@@ -119,7 +119,7 @@ def apply_group(world, state, size, share):
     return lost, share
 
 
-@kernel(needs="unequal_restitution pushing implicit", otherwise=(0, 1.0, False))
+@kernel(needs="unequal_restitution pushing supports", otherwise=(0, 1.0, False))
 def resolve_unequal(world, state, size, count, smallest):
     """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e, which is passive."""
     mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]

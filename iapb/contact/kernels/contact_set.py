@@ -36,14 +36,14 @@ def same_surface(first, i, second, j, cosine):
             and dot(load(first.normal, i), load(second.normal, j)) >= cosine)
 
 
-@kernel
-def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
-    """Collapse contacts of one surface closer than `distance` [m] into the deepest; return how many stay.
+@kernel(needs="clustering", otherwise=0)
+def cluster(world, contacts, count):
+    """Collapse contacts of one surface closer than `cluster_distance` into the deepest; return how many stay.
 
-    Contacts are visited deepest first. A contact is kept unless a deeper kept contact of its surface is closer than
-    `distance`. So kept contacts of a surface are at least `distance` apart; they keep their order.
+    Contacts are visited deepest first. A contact is kept unless a deeper kept contact of its surface is closer. So kept
+    contacts of a surface are at least that distance apart; they keep their order.
     """
-    near = False  # usually none are, and to see this is cheaper than the clustering
+    distance, near = world.cluster_distance, False  # usually none are, and to see this is cheaper than the clustering
     for i in range(count):
         for j in range(i):
             near = near or squared_distance(contacts, i, contacts, j) < distance * distance
@@ -59,7 +59,7 @@ def cluster(contacts, count, distance, cosine=ALIGNED_COSINE):
             break
         contacts.mark[deepest] = _KEPT
         for i in range(count):
-            if (contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i, cosine)
+            if (contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i, ALIGNED_COSINE)
                     and squared_distance(contacts, deepest, contacts, i) < distance * distance):
                 contacts.mark[i] = _DROPPED
     kept = 0

@@ -43,7 +43,8 @@ def rest_implicitly(world, state, rubs):
     work.first[:] = -1
     for i in range(state.contact_count[0] - 1, -1, -1):
         contacts.normal_force[i] = 0.0
-        store(contacts.friction_force, i, (0.0, 0.0, 0.0))
+        if rubs:
+            store(contacts.friction_force, i, (0.0, 0.0, 0.0))
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         if group >= 0 and contacts.gap[i] <= 0.0 and contacts.mark[i] != LEFT:
             work.next[i], work.first[group], some = work.first[group], i, True
@@ -87,7 +88,7 @@ def place_trees(world, state, group):
             work.free[size], work.v[size] = state.v[k], state.start_v[k]
             size += 1
         t = work.next_tree[t]
-    work.energy[0] = 0.5 * mass_form(world, state, size, work.free, work.free)
+    work.energy[0] = -1.0  # not known yet
     return size
 
 
@@ -169,9 +170,10 @@ def set_impulses(world, state, count, s, k, share):
     for r in range(count):
         n = r * s
         work.p[n] = push(world, state, r, k, work.speed[n] + share * work.change[n])
-        _, divisor = slide_length(work, r, s, share)
-        for j in range(n + 1, n + s):
-            work.p[j] = -(work.speed[j] + share * work.change[j]) / divisor
+        if s > 1:
+            _, divisor = slide_length(work, r, s, share)
+            for j in range(n + 1, n + s):
+                work.p[j] = -(work.speed[j] + share * work.change[j]) / divisor
 
 
 @kernel
@@ -190,7 +192,7 @@ def open_balance(world, state, size, count, s, k):
 
     It is a share of the energy of the step, that of v* and of the springs.
     """
-    work, energy = state.rest_work, state.rest_work.energy[0]
+    work, squares = state.rest_work, 0.0
     along_rows(work, count, s, work.v, work.speed)
     for i in range(size):
         work.change_of_v[i] = work.v[i] - work.free[i]
@@ -200,9 +202,8 @@ def open_balance(world, state, size, count, s, k):
         for j in range(r * s, (r + 1) * s):
             if work.p[j] != 0.0:
                 add_along_row(work, r, j, -work.p[j], work.balance)
-        if work.p[r * s] > 0.0:
-            energy += 0.5 * work.p[r * s] * work.p[r * s] / (world.dt * k)
-    given = work.given[:size]
+        squares += work.p[r * s] * work.p[r * s]
+    given, springs = work.given[:size], 0.5 * squares / (world.dt * k) if squares > 0.0 else 0.0
     for i in range(size):  # |L⁻¹ r|² = rᵀ M⁻¹ r
         dof = work.dof[i]
         entry, row, ahead = work.balance[i], state.lower[dof], dof - i
@@ -210,7 +211,19 @@ def open_balance(world, state, size, count, s, k):
             entry -= row[ahead + j] * given[j]
         given[i] = entry / row[dof]
     wrong = 0.5 * dot_of(given, given)
+    if wrong <= EXACT * springs:  # at rest: the energy of v* is not needed
+        return EXACT
+    energy = free_energy(world, state, size) + springs
     return wrong / energy if energy > 0.0 else wrong
+
+
+@kernel
+def free_energy(world, state, size):
+    """Return ½ v*ᵀ M v* [J]."""
+    work = state.rest_work
+    if work.energy[0] < 0.0:
+        work.energy[0] = 0.5 * mass_form(world, state, size, work.free, work.free)
+    return work.energy[0]
 
 
 @kernel
@@ -382,7 +395,7 @@ def guard(world, state, size, count, s):
     """Shorten a solution that would make energy: with share 0, everything stands still and Φ stays as it is."""
     work, share = state.rest_work, 1.0
     after = 0.5 * mass_form(world, state, size, work.v, work.v)
-    allowed = (work.energy[0] + spring_energy(world, state, count, s, 0.0)) * (1.0 + GAIN)
+    allowed = (free_energy(world, state, size) + spring_energy(world, state, count, s, 0.0)) * (1.0 + GAIN)
     while share > 0.0 and after * share * share + spring_energy(world, state, count, s, share) > allowed:
         share = 0.5 * share if share > 1e-3 else 0.0
     if share < 1.0:
@@ -402,12 +415,13 @@ def give_back(world, state, size, count, s):
         i, force = work.contact[r], (0.0, 0.0, 0.0)
         contacts.normal_force[i] = work.p[r * s] / world.dt
         add_along_row(work, r, r * s, contacts.normal_force[i], pushed)
-        n = load(contacts.normal, i)
-        for j in range(1, s if work.limit[r] > 0.0 else 1):
-            size_of_force = work.p[r * s + j] / world.dt
-            force = add(force, scale(size_of_force, tangent_of(n, j - 1, s - 1)))
-            add_along_row(work, r, r * s + j, size_of_force, rubbed)
-        store(contacts.friction_force, i, force)
+        if s > 1 and work.limit[r] > 0.0:
+            n = load(contacts.normal, i)
+            for j in range(1, s):
+                size_of_force = work.p[r * s + j] / world.dt
+                force = add(force, scale(size_of_force, tangent_of(n, j - 1, s - 1)))
+                add_along_row(work, r, r * s + j, size_of_force, rubbed)
+            store(contacts.friction_force, i, force)
     for i in range(size):
         k = work.dof[i]
         state.v[k] = state.mean_v[k] = work.v[i]

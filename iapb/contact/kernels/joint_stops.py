@@ -18,18 +18,19 @@ def is_stop(contacts, i):
     return contacts.shape_a[i] == contacts.shape_b[i]
 
 
-@kernel
-def add_stops(mechanism, stops, w, q, margin, contacts, count):
-    """Append the stops with gap <= margin [m] after `count` contacts; return the new count, −1 if there is no room."""
+@kernel(needs="joint_limits", otherwise=0)
+def add_stops(world, state, contacts, count):
+    """Append the stops that are reached after `count` contacts; return the new count, −1 if there is no room."""
+    stops, w = world.stops, state.body
     for i in range(stops.bound.shape[0]):
-        gap = stops.arm[i] * stops.sign[i] * (q[stops.coordinate[i]] - stops.bound[i])
-        if gap > margin:
+        gap = stops.arm[i] * stops.sign[i] * (state.q[stops.coordinate[i]] - stops.bound[i])
+        if gap > 0.0:
             continue
         if count >= contacts.gap.shape[0]:
             return -1
         k, body = stops.dof[i], stops.body[i]
         point, normal = load(w.position, body), load(w.axis, k)
-        if mechanism.dof_rotates[k]:
+        if world.mechanism.dof_rotates[k]:
             lever = tangent_of(normal, 0, 2)
             point = add(point, scale(stops.arm[i], lever))
             normal = cross(normal, lever)

@@ -84,7 +84,7 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
     return count
 
 
-@kernel
+@kernel(needs="polygons", otherwise=-1)
 def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, count):
     """Write the contact of a circle and a convex polygon, at the polygon's nearest edge or vertex.
 
@@ -129,7 +129,7 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
 ROUNDING_SHARE = 1e-12
 
 
-@kernel
+@kernel(needs="polygons", otherwise=-1)
 def polygons(shapes, a, b, R, p, margin, buffer, count):
     """Write the contacts (two at most) of convex polygons a and b; comments above describe the method."""
     separation_a, edge_a = best_edge(shapes, a, b, R, p, margin)

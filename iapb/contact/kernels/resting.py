@@ -31,7 +31,7 @@ def friction_share(normal_force, speed, friction, friction_velocity):
     return -friction * normal_force / reach
 
 
-@kernel
+@kernel(needs="explicit")
 def resting_force(world, state, contacts, i):
     """Add the forces (4) of contact i, if its gap <= 0, to those of the stage, as generalized forces Jᵀ F.
 

@@ -19,8 +19,8 @@ ROW_NOISE = 1e-13
 
 
 @kernel
-def add_body_row(m, w, body, x, n, factor, out):
-    """out (d,) += factor · nᵀJ of the body at the world point x; the static world (-1) adds nothing.
+def add_body_row(m, w, body, x, n, factor, out, shift=0):
+    """out[shift + k] += factor · nᵀJ of the body at the world point x, k < d; the static world (-1) adds nothing.
 
     With j the motion of x per unit rate of a dof, the entry n·j is left out if it is only rounding. For a translation
     the bound is |n·j| <= ROW_NOISE ‖j‖. For a rotation j = a × (x − o), and the lever x − o has the rounding of x and
@@ -38,7 +38,7 @@ def add_body_row(m, w, body, x, n, factor, out):
             square = dot(j, j) + dot(x, x) + dot(o, o)
         entry = dot(n, j)
         if not entry * entry <= ROW_NOISE * ROW_NOISE * square:  # NaN is no noise
-            out[k] += factor * entry
+            out[shift + k] += factor * entry
         k = m.dof_parent[k]
 
 
@@ -61,17 +61,15 @@ def direction_row(m, w, contacts, i, direction, out):
 @kernel
 def write_pair_row(world, state, trees, i, direction, out):
     """Write the row along a direction at contact i to out (2 w,): w entries for each of its two trees (−1 = none)."""
-    row, x = state.row, load(state.contacts.point, i)
-    for side in range(2):
-        if trees[side] >= 0:
-            row[world.tree_start[trees[side]] : world.tree_stop[trees[side]]] = 0.0
-    add_body_row(world.mechanism, state.body, state.contacts.body_a[i], x, direction, 1.0, row)
-    add_body_row(world.mechanism, state.body, state.contacts.body_b[i], x, direction, -1.0, row)
-    for side in range(2):
-        if trees[side] >= 0:
-            start = world.tree_start[trees[side]]
-            for k in range(world.tree_stop[trees[side]] - start):
-                out[side * (out.shape[0] // 2) + k] = row[start + k]
+    half, x, factor = out.shape[0] // 2, load(state.contacts.point, i), 1.0
+    out[:] = 0.0
+    for body in (state.contacts.body_a[i], state.contacts.body_b[i]):
+        if body >= 0:
+            tree = world.tree_of_body[body]
+            if tree in trees:
+                shift = (half if tree == trees[1] else 0) - world.tree_start[tree]
+                add_body_row(world.mechanism, state.body, body, x, direction, factor, out, shift)
+        factor = -1.0
 
 
 @kernel

@@ -71,7 +71,7 @@ def world_axes(shapes, shape, R):
     return world_axis(shapes, shape, 0, R), world_axis(shapes, shape, 1, R), world_axis(shapes, shape, 2, R)
 
 
-@kernel
+@kernel(needs="balls", otherwise=-1)
 def balls(shapes, a, b, R, p, margin, buffer, count):
     """Write the contact of two circles or two spheres: gap = distance of centres - both radii.
 

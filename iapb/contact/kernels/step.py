@@ -143,9 +143,9 @@ def present_contacts(world, state, contacts):
     for i in range(count):
         contacts.gap[i] = min(contacts.gap[i], 0.0)
     if world.switches.clustering:
-        count = cluster(contacts, count, world.cluster_distance)
+        count = cluster(world, contacts, count)
     if world.switches.joint_limits and count >= 0:
-        count = add_stops(world.mechanism, world.stops, state.body, state.q, 0.0, contacts, count)
+        count = add_stops(world, state, contacts, count)
     return count
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class MechanismArrays(NamedTuple):
     dof_body: Integers  # (d,) body that the dof moves
     dof_parent: Integers  # (d,) dof before it on the path from the world, -1 = none
     dof_rotates: Booleans  # (d,) turns about its axis; otherwise moves along it
+    quaternions: Any  # whether a joint has one (`iapb.compiled.flag`)
 
 
 class Workspace(NamedTuple):

@@ -41,12 +41,16 @@ def turn_quaternion(q, i, phi, out):
     out[i + 3] = scalar / length
 
 
-@kernel
-def integrate_free_flyer(q, i, v, k, dt, out):
-    """p += R (1 + A [phi]x + B [phi]x^2) u with u = v_linear dt, phi = v_angular dt; R turns by phi, t = |phi|.
+@kernel(needs="quaternions")
+def integrate_in_space(m, b, q, v, dt, out):
+    """Turn a spherical joint; a free flyer moves as p += R (1 + A [phi]x + B [phi]x^2) u, and R turns by phi.
 
-    A = (1 - cos t) / t^2, B = (t - sin t) / t^3.
+    u = v_linear dt, phi = v_angular dt, t = |phi|, A = (1 - cos t) / t^2, B = (t - sin t) / t^3.
     """
+    i, k = m.q_start[b], m.v_start[b]
+    if m.kind[b] == SPHERICAL:
+        turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
+        return
     u = (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt)
     phi = (v[k + 3] * dt, v[k + 4] * dt, v[k + 5] * dt)
     angle = sqrt(dot(phi, phi))
@@ -78,10 +82,8 @@ def integrate_body(m, b, q, v, dt, out):
         c, s = q[i] * cos - q[i + 1] * sin, q[i + 1] * cos + q[i] * sin
         length = sqrt(c * c + s * s)
         out[i], out[i + 1] = c / length, s / length
-    elif kind == SPHERICAL:
-        turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
-    elif kind == FREE_FLYER:
-        integrate_free_flyer(q, i, v, k, dt, out)
+    elif kind in (SPHERICAL, FREE_FLYER):
+        integrate_in_space(m, b, q, v, dt, out)
     else:
         for j in range(m.v_count[b]):
             out[i + j] = q[i + j] + dt * v[k + j]
@@ -122,6 +124,20 @@ def inverse_screw(path, phi):
     return add(path, add(scale(-0.5, turned), scale(factor, cross(phi, turned))))
 
 
+@kernel(needs="quaternions")
+def difference_in_space(m, b, q0, q1, out):
+    """Write the velocity of body b, which has a quaternion, from q0 to q1."""
+    i, k = m.q_start[b], m.v_start[b]
+    if m.kind[b] == SPHERICAL:
+        out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
+        return
+    phi = quaternion_difference(q0, q1, i + 3)
+    path = (q1[i] - q0[i], q1[i + 1] - q0[i + 1], q1[i + 2] - q0[i + 2])
+    path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
+    out[k], out[k + 1], out[k + 2] = inverse_screw(path, phi)
+    out[k + 3], out[k + 4], out[k + 5] = phi
+
+
 @kernel
 def difference(m, q0, q1, out):
     """out (d,) <- the v with integrate(q0, v, 1) = q1, by the shortest rotations."""
@@ -129,14 +145,8 @@ def difference(m, q0, q1, out):
         kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
         if kind == CONTINUOUS:
             out[k] = arc_tangent(q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1])
-        elif kind == SPHERICAL:
-            out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
-        elif kind == FREE_FLYER:
-            phi = quaternion_difference(q0, q1, i + 3)
-            path = (q1[i] - q0[i], q1[i + 1] - q0[i + 1], q1[i + 2] - q0[i + 2])
-            path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
-            out[k], out[k + 1], out[k + 2] = inverse_screw(path, phi)
-            out[k + 3], out[k + 4], out[k + 5] = phi
+        elif kind in (SPHERICAL, FREE_FLYER):
+            difference_in_space(m, b, q0, q1, out)
         else:
             for j in range(m.v_count[b]):
                 out[k + j] = q1[i + j] - q0[i + j]

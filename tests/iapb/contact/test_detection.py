@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from iapb.compiled import block
 from iapb.contact.geometry import ContactBuffer
 from iapb.contact.kernels.contact_set import ALIGNED_COSINE, cluster, mark_new
 from iapb.errors import IapbError
@@ -262,7 +263,7 @@ def test_what_faces_as_a_neighbour_did_is_the_same_contact_and_nothing_else(
     for field in both._fields:
         getattr(before, field)[:] = getattr(both, field)[1:]
     mark_new(both, 1, before, 1, 1.0)
-    assert both.is_new[0] != same and cluster(both, 2, 1.0) == (1 if same else 2)
+    assert both.is_new[0] != same and cluster(block({"cluster_distance": 1.0}), both, 2) == (1 if same else 2)
 
 
 # --- the whole of a run ----------------------------------------------------------------------------------------------

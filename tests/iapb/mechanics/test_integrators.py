@@ -7,7 +7,7 @@ import pytest
 
 from iapb.mechanics.integrators import INTEGRATORS, Integrator
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
-from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
+from verification.mechanics.tumbling import COMMUTATOR_FREE_4
 
 FIELD = np.array([0.0, -9.81, 0.0])
 DURATION = 0.5  # [s]

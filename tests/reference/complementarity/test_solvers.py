@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable
 from importlib.util import find_spec
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,6 @@ from reference.complementarity.solution import project_on_cone
 from reference.complementarity.solvers import SolverEntry
 from reference.complementarity.solvers.enumeration import all_solutions
 from reference.datasets import read_problem
-from reference.one_thread import one_thread
 
 ROOT = Path(__file__).resolve().parents[3]
 # What each solver reaches on small redundant problems, relative velocity, with a factor ten of room.
@@ -369,43 +367,6 @@ def test_joints_are_as_if_their_coordinates_were_eliminated(relaxed: bool) -> No
             assert lifted.solved(1e-5)
         for other in ("pinocchio_admm", "pinocchio_pgs"):
             assert solve(problem, other).verdict() == "refused"
-
-
-# --- large hyperstatic problems -----------------------------------------------------------------------------------
-def brick_wall(layers: int = 5, bricks: int = 8) -> ImpactProblem:
-    """A wall of bricks 2 x 1 x 1 in running bond, masses over two decades, one step of gravity: four corners a face.
-
-    Eight and seven bricks by turns make 256 contacts (768 unknowns) of rank 228, as the stacks and towers of FCLIB.
-    """
-    middle = np.array([[2.0 * i + k % 2, 0.0, k + 0.5] for k in range(layers) for i in range(bricks - k % 2)])
-    count, rows = len(middle), []
-    for a, (x, _, z) in enumerate(middle):
-        below = [b for b in range(count) if middle[b, 2] == z - 1.0 and abs(middle[b, 0] - x) < 2.0] or [-1]
-        for b in below:
-            other = middle[b, 0] if b >= 0 else x
-            for corner in product((max(x, other) - 1.0, min(x, other) + 1.0), (-0.5, 0.5)):
-                for way in np.roll(np.eye(3), 1, axis=0):  # up, then along the wall and across
-                    row, point = np.zeros((count, 6)), np.array([*corner, z - 0.5])
-                    for body, sign in ((a, 1.0), (b, -1.0))[: 1 + (b >= 0)]:
-                        row[body] = sign * np.concatenate([way, np.cross(point - middle[body], way)])
-                    rows.append(row.ravel())
-    mass = 2.0 * 10.0 ** np.random.default_rng(2).uniform(-1.0, 1.0, count)
-    diagonal = np.outer(mass, [1.0, 1.0, 1.0, 2.0 / 12.0, 5.0 / 12.0, 5.0 / 12.0]).ravel()
-    velocity = np.tile([0.0, 0.0, -0.0981, 0.0, 0.0, 0.0], count)
-    return ImpactProblem.from_impact(np.diag(diagonal), np.array(rows), velocity, 0.0, 0.8, name="brick wall")
-
-
-def test_a_wall_of_768_unknowns_is_solved_by_two() -> None:
-    """A wall of bricks stands: Newton and ADMM say so to rounding, the interior point to the root of its accuracy."""
-    problem = brick_wall()
-    assert (problem.size, np.linalg.matrix_rank(problem.delassus)) == (768, 228)
-    with one_thread():
-        newton, admm, cone = (solve(problem, name) for name in ("newton_cones", "pinocchio_admm", "cvxpy_socp"))
-    assert newton.solved(1e-9), (newton.note, newton.residuals)
-    assert admm.solved(1e-9), (admm.note, admm.residuals)
-    assert cone.solved(1e-4), (cone.note, cone.residuals)
-    for solution in (newton, admm, cone):
-        assert np.abs(solution.velocity_plus).max() <= 1e-4 * 0.0981
 
 
 @pytest.mark.skipif(not PROBLEMS.exists(), reason="shared problem files are not here")

@@ -16,7 +16,7 @@ import pytest
 
 from iapb.run import Run
 from reports.figures import RECIPES
-from reports.figures.two_link_arm import arm_energies
+from reports.figures.paper import arm_energies
 from reports.pages.builder import build_report
 from reports.pages.records import Evidence
 from reports.report import write_report

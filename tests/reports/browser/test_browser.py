@@ -89,16 +89,6 @@ def test_each_page_is_whole_at_any_width(sight: Any, first: Path) -> None:
     assert figures == 5
 
 
-def test_the_contents_lead_to_every_page_and_back(sight: Any, first: Path) -> None:
-    sight.page.goto(first.as_uri())
-    for path in pages_of(first)[1:]:
-        sight.page.locator(f"nav a[href$='{path.stem}.html#{path.stem}']").click()
-        sight.page.wait_for_url(f"{path.as_uri()}#{path.stem}")
-        assert sight.page.locator("nav [aria-current]").count() == 1
-    sight.page.locator("nav a").first.click()
-    sight.page.wait_for_url(f"{first.as_uri()}#verdict")
-
-
 def test_the_checks_see_a_page_that_is_not_whole(desk: Any) -> None:
     desk.ask("""() => {
         document.querySelector("nav a").setAttribute("href", "#nowhere");
@@ -141,30 +131,21 @@ def test_without_script_the_content_is_there(see: Callable[..., Any], first: Pat
         assert sight.errors == []
 
 
-FIGURE_PARTS = {"#fig07 .legend button", "summary", ".scroll"}
-PLAYER_PARTS = {".controls button", ".controls input", ".ways a"}
+REACHED = {"figures": {"#fig07 .legend button", "summary", ".scroll"},
+           None: {".controls button", ".controls input", ".ways a"}}  # fmt: skip
 
 
-@pytest.mark.parametrize("wanted", [FIGURE_PARTS, PLAYER_PARTS], ids=["figure", "player"])
-def test_the_keyboard_reaches_everything(see: Callable[..., Any], first: Path, wanted: set[str]) -> None:
-    with see("figures" if wanted == FIGURE_PARTS else first) as sight:
-        page = sight.page
-        if wanted == FIGURE_PARTS:
-            sight.ask("() => { document.querySelector('#fig07 details').open = true; }")  # a table stands in it
-        page.keyboard.press("Tab")
+@pytest.mark.parametrize("name", REACHED)
+def test_the_keyboard_reaches_everything(see: Callable[..., Any], first: Path, name: str | None) -> None:
+    with see(name or first) as sight:
+        sight.ask("() => document.querySelectorAll('#fig07 details').forEach((part) => { part.open = true; })")
+        sight.page.keyboard.press("Tab")
         assert sight.ask("() => document.activeElement.className") == "skip"
-        assert page.locator(".skip").bounding_box()["x"] >= 0
         reached: set[str] = set()
         for _ in range(120):
-            page.keyboard.press("Tab")
-            reached |= set(sight.ask(FOCUSED, list(wanted)))
-            if reached == wanted:
-                break
-        assert reached == wanted
-        page.goto(page.url.split("#")[0])
-        page.keyboard.press("Tab")
-        page.keyboard.press("Enter")
-        page.wait_for_url("**#content")
+            sight.page.keyboard.press("Tab")
+            reached |= set(sight.ask(FOCUSED, list(REACHED[name])))
+        assert reached == REACHED[name]
 
 
 def test_a_link_into_something_folded_unfolds_it(see: Callable[..., Any], first: Path) -> None:

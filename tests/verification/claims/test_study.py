@@ -34,8 +34,9 @@ def test_each_simulation_is_run_once(few):
         calls.append((scene.source_text, world, rendering))
         return run_world(scene, world, rendering)
 
-    check_claims(run=run, ids=["C14", "C16"])
-    assert calls and len(calls) == len(set(calls))
+    said = []
+    check_claims(run=run, ids=["C14", "C16"], progress=lambda *done: said.append(done))
+    assert calls and len(calls) == len(set(calls)) and said == [(0, 2, "C14"), (1, 2, "C16"), (2, 2, "")]
 
 
 def test_a_region_that_the_shared_sequence_misses_gets_starts_of_its_own():
@@ -67,23 +68,6 @@ def test_worlds_under_the_wrong_name_are_found_out(few):
     assert wrong["C16"].verdict == NOT_TESTABLE  # a world without impulses reaches no limit
 
 
-def test_runs_made_ahead_are_not_made_again_and_change_no_number(few):
-    made, here = [], []
-
-    def ahead(wanted):
-        found = [run_world(*one) if n % 3 else None for n, one in enumerate(wanted)]
-        made.extend(found)
-        return found
-
-    def run(*wanted):
-        here.append(wanted)
-        return run_world(*wanted)
-
-    plain, quick = (check_claims(run=each, ids=["C14"], ahead=crew)
-                    for each, crew in ((run_world, None), (run, ahead)))  # fmt: skip
-    assert plain == quick and made and len(here) == made.count(None)
-
-
 def test_regions_that_overlap_share_the_starts_that_confirm_them():
     tested = start_conditions("quick")
     wide, narrow = (drawn(tested, Region((("tilt", "rad", None, high),)), 1, 40) for high in (0.3, 0.15))
@@ -92,12 +76,6 @@ def test_regions_that_overlap_share_the_starts_that_confirm_them():
     friction = drawn(tested, Region((("friction", "", 0.1, None),)), 1, 40)
     assert all(start.friction >= 0.1 for start in friction)
     assert [start.seen_by("ideal", "full") for start in friction] == [start.seen_by("ideal", "full") for start in wide]
-
-
-def test_progress_names_every_claim():
-    said = []
-    check_claims(ids=["C07"], progress=lambda done, total, name: said.append((done, total, name)))
-    assert said == [(0, 1, "C07"), (1, 1, "")]
 
 
 def test_unknown_claims_and_depths_are_refused():

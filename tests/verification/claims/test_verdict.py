@@ -1,5 +1,7 @@
 """The rule that turns trials into a verdict, the search for regions, and the words about them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,52 +20,35 @@ from verification.finding import (
     verdict_of_trials,
 )
 from verification.region import LEAST_CONFIRMING, search_region
-from verification.table import Column, table_of
+from verification.table import table_from
 
-GRID = (Column("tilt", "rad", condition=True), Column("width", "m", condition=True))
+YES, NO, UNKNOWN = True, False, None
 
 
-@pytest.mark.parametrize(
-    ("holds", "verdict"),
-    [
-        ([True, True, None], REPRODUCED),
-        ([True, True, False], MIXED),
-        ([True, False], MIXED),
-        ([True, False, False], REFUTED),
-        ([False], REFUTED),
-        ([None, None], NOT_TESTABLE),
-        ([], NOT_TESTABLE),
-    ],
-)
+def table(rows, holds, **marks):
+    """A judged table of these rows, by default with two conditions."""
+    return replace(table_from(rows, **(marks or {"condition": ["tilt", "width"]})), holds=tuple(holds))
+
+
+@pytest.mark.parametrize(("holds", "verdict"), [
+    ([YES, YES, UNKNOWN], REPRODUCED), ([YES, YES, NO], MIXED), ([YES, NO], MIXED), ([YES, NO, NO], REFUTED),
+    ([NO], REFUTED), ([UNKNOWN, UNKNOWN], NOT_TESTABLE), ([], NOT_TESTABLE)])  # fmt: skip
 def test_verdict_follows_from_the_trials(holds, verdict):
     assert verdict_of_trials(holds) == verdict
 
 
-@pytest.mark.parametrize(
-    ("verdicts", "verdict"),
-    [
-        ([REPRODUCED] * 2, REPRODUCED),
-        ([REPRODUCED, WHERE], WHERE),
-        ([REPRODUCED, NOT_TESTABLE], NOT_TESTABLE),
-        ([WHERE, NOT_COMPUTED], NOT_COMPUTED),
-        ([REPRODUCED] * 1000 + [REFUTED], REFUTED),
-        ([NOT_COMPUTED, MIXED], MIXED),
-        ([], NOT_COMPUTED),
-    ],
-)
+@pytest.mark.parametrize(("verdicts", "verdict"), [
+    ([REPRODUCED] * 2, REPRODUCED), ([REPRODUCED, WHERE], WHERE), ([REPRODUCED, NOT_TESTABLE], NOT_TESTABLE),
+    ([WHERE, NOT_COMPUTED], NOT_COMPUTED), ([REPRODUCED] * 1000 + [REFUTED], REFUTED), ([NOT_COMPUTED, MIXED], MIXED),
+    ([], NOT_COMPUTED)])  # fmt: skip
 def test_a_finding_is_never_better_than_its_worst_part(verdicts, verdict):
     assert verdict_of(Part("", one) for one in verdicts) == verdict
 
 
-@pytest.mark.parametrize(
-    ("part", "verdict"),
-    [
-        (Part("", NOT_TESTABLE, optional=True), REPRODUCED),
-        (Part("", NOT_TESTABLE), NOT_TESTABLE),
-        (Part("", NOT_TESTABLE, held=9, decided=9, optional=True), NOT_TESTABLE),
-        (Part("", REFUTED, optional=True), REFUTED),
-    ],
-)
+@pytest.mark.parametrize(("part", "verdict"), [
+    (Part("", NOT_TESTABLE, optional=True), REPRODUCED), (Part("", NOT_TESTABLE), NOT_TESTABLE),
+    (Part("", NOT_TESTABLE, held=9, decided=9, optional=True), NOT_TESTABLE),
+    (Part("", REFUTED, optional=True), REFUTED)])  # fmt: skip
 def test_only_an_optional_part_that_is_absent_is_left_out(part, verdict):
     assert verdict_of([Part("", REPRODUCED), part]) == verdict
     assert verdict_of([Part("", NOT_TESTABLE, optional=True)]) == NOT_TESTABLE
@@ -101,44 +86,35 @@ def test_a_part_that_never_holds_says_so():
 
 
 def test_trials_that_cannot_tell_are_counted_apart():
-    part = judge_part("x", table_of(GRID, [{"tilt": 0.0}] * 12, holds=(True,) * 10 + (None, None)))
+    part = judge_part("x", table([{"tilt [rad]": 0.0}] * 12, [YES] * 10 + [UNKNOWN] * 2))
     assert (part.verdict, part.held, part.decided, part.unknown) == (REPRODUCED, 10, 10, 2)
     assert part.sentence == "holds in 10 of 10 trials; 2 of 12 cannot tell."
 
 
-@pytest.mark.parametrize(
-    ("held", "failed", "verdict"),
-    [
-        (LEAST_DECIDED - 1, 0, NOT_TESTABLE),
-        (LEAST_DECIDED, 0, REPRODUCED),
-        (1, 0, NOT_TESTABLE),
-        (8, 1, MIXED),
-        (3, 1, MIXED),
-        (1, 3, REFUTED),
-        (1, 8, REFUTED),
-        (0, 1, REFUTED),
-        (0, 4, REFUTED),
-        (1, LEAST_DECIDED - 1, REFUTED),
-    ],
-)
+@pytest.mark.parametrize(("held", "failed", "verdict"), [
+    (LEAST_DECIDED - 1, 0, NOT_TESTABLE), (LEAST_DECIDED, 0, REPRODUCED), (1, 0, NOT_TESTABLE), (8, 1, MIXED),
+    (3, 1, MIXED), (1, 3, REFUTED), (0, 1, REFUTED), (1, LEAST_DECIDED - 1, REFUTED)])  # fmt: skip
 def test_few_trials_reproduce_nothing_but_one_that_fails_counts(held, failed, verdict):
-    outcomes = (True,) * held + (False,) * failed + (None,) * 3
-    part = judge_part("x", table_of(GRID, [{"tilt": 0.0}] * len(outcomes), holds=outcomes))
+    outcomes = [YES] * held + [NO] * failed + [UNKNOWN] * 3
+    part = judge_part("x", table([{"tilt [rad]": 0.0}] * len(outcomes), outcomes))
     assert part.verdict == verdict
     assert ("fewer than 10 decide" in part.sentence) == (held + failed < LEAST_DECIDED)
 
 
 def test_a_trial_may_stand_for_many_cases():
-    columns = (Column("impacts", cases=True),)
-    of = {count: judge_part("x", table_of(columns, [{"impacts": count}] * 2, holds=(True, None))) for count in (9, 10)}
+    of = {n: judge_part("x", table([{"impacts": n}] * 2, [YES, UNKNOWN], cases=["impacts"])) for n in (9, 10)}
     assert of[9].verdict == NOT_TESTABLE and of[10].verdict == REPRODUCED
     assert of[10].sentence == "holds in 1 of 1 trials; 1 of 2 cannot tell, which stand for 10 cases."
 
 
 def trials(holds, widths=(1.0, 2.0, 3.0, 4.0)):
     """The outcomes on a grid of 13 tilts and some widths."""
-    rows = [{"tilt": n / 40, "width": width} for n in range(13) for width in widths]
-    return table_of(GRID, rows, holds=tuple(holds(row) for row in rows))
+    rows = [{"tilt [rad]": n / 40, "width [m]": width} for n in range(13) for width in widths]
+    return table(rows, ()).judged(holds)
+
+
+def gentle(row):
+    return row["tilt"] <= 0.2
 
 
 def drawn_by(holds, count=20):
@@ -147,18 +123,16 @@ def drawn_by(holds, count=20):
     def draw(region):
         rng = np.random.default_rng(5)
         tilt, width = region.ends("tilt", (0.0, 0.3)), region.ends("width", (1.0, 4.0))
-        rows = [{"tilt": rng.uniform(*tilt), "width": rng.uniform(*width)} for _ in range(count)]
-        assert all(region.contains(row) for row in rows)
-        return table_of(GRID, rows, holds=tuple(holds(row) for row in rows))
+        rows = [{"tilt [rad]": rng.uniform(*tilt), "width [m]": rng.uniform(*width)} for _ in range(count)]
+        drawn = table(rows, ()).judged(holds)
+        assert all(region.contains(row) for row in drawn.records())
+        return drawn
 
     return draw
 
 
 def test_a_region_that_is_there_is_found_and_confirmed_with_its_counts():
-    def holds(row):
-        return row["tilt"] <= 0.2
-
-    part = judge_part("x", trials(holds), drawn_by(holds))
+    part = judge_part("x", trials(gentle), drawn_by(gentle))
     assert part.outcome == "reproduced where tilt <= 0.2 rad"
     assert part.region.share == pytest.approx(2 / 3) and part.region.fresh == 20
     assert part.region.searched + part.region.others == part.held
@@ -176,25 +150,20 @@ def test_a_second_condition_must_pay():
 
 
 def test_fresh_trials_that_fail_refute_a_region_that_the_grid_holds():
-    table = trials(lambda row: row["tilt"] <= 0.2)
-    part = judge_part("x", table, drawn_by(lambda row: row["tilt"] <= 0.1))
+    part = judge_part("x", trials(gentle), drawn_by(lambda row: row["tilt"] <= 0.1))
     assert (part.verdict, part.region) == (MIXED, None)
     assert "fresh trials" in part.sentence
 
 
 @pytest.mark.parametrize("count", [LEAST_CONFIRMING - 1, LEAST_CONFIRMING])
 def test_too_few_fresh_trials_confirm_nothing(count):
-    def holds(row):
-        return row["tilt"] <= 0.2
-
-    part = judge_part("x", trials(holds), drawn_by(holds, count))
+    part = judge_part("x", trials(gentle), drawn_by(gentle, count))
     assert (part.verdict == WHERE) == (count >= LEAST_CONFIRMING)
 
 
 def test_without_fresh_trials_the_other_half_must_confirm():
-    small = trials(lambda row: row["tilt"] <= 0.2, widths=(1.0,))
-    assert judge_part("x", small).verdict == MIXED
-    assert judge_part("x", trials(lambda row: row["tilt"] <= 0.2)).verdict == WHERE
+    assert judge_part("x", trials(gentle, widths=(1.0,))).verdict == MIXED
+    assert judge_part("x", trials(gentle)).verdict == WHERE
 
 
 @pytest.mark.parametrize("share", [0.55, 0.75, 0.85])

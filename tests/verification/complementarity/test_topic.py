@@ -13,13 +13,7 @@ from reference.datasets import StoredProblem, write_fclib
 from verification.check import Study
 from verification.complementarity import extensions
 from verification.complementarity.extensions import BAR, FRICTION, LAW_OF_UNEQUAL, UNEQUAL
-from verification.complementarity.solvers import (
-    FACTORS,
-    collections,
-    own_problems,
-    study_problems,
-    study_read,
-)
+from verification.complementarity.solvers import FACTORS, collections, own_problems, study_read
 from verification.complementarity.topic import REFERENCES
 from verification.cost import solvers as timings
 from verification.cost.calls import PRINTED
@@ -70,14 +64,14 @@ def test_every_way_is_timed_on_every_size_and_gives_the_same_motion(monkeypatch:
 
 
 def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = timings.solver_call
+    original = timings.calls.solver_call
 
     def wrong(case, name):  # type: ignore[no-untyped-def]
         if name == "quadprog":
             raise ZeroDivisionError("planted")
         return (lambda: case.velocity) if name == "lemke" else original(case, name)
 
-    monkeypatch.setattr(timings, "solver_call", wrong)
+    monkeypatch.setattr(timings.calls, "solver_call", wrong)
     monkeypatch.setattr(timings, "SOLVERS", ("daqp", "lemke", "quadprog"))
     monkeypatch.setitem(timings.LONGEST, "quick", 0.0)
     study = Study(failures=[])
@@ -95,22 +89,17 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     (tmp_path / "skew.lcp").write_text("2  2 1  0 2  -1 -1")
     (tmp_path / "damaged.lcp").write_text("3 1 2")
     (tmp_path / "readme.md").write_text("not a problem")
-    told: list[tuple[str, int, int]] = []
-    found = study_problems(tmp_path, progress=lambda *state: told.append(state))
-    assert [state[1:] for state in told] == [(0, total := len(found.rows)), *((n, total) for n in range(total + 1))]
-    one, skew, damaged = found.lines
+    study, (check, profile) = Study(), collections({"given": tmp_path})
+    table = check.table(study)
+    one, skew, damaged = table.records()
     assert (one["problem"], skew["problem"], damaged["problem"]) == ("one.hdf5", "skew.lcp", "damaged.lcp")
     assert skew["asymmetry of W"] > 0.1 and (skew["daqp"], skew["lemke"]) == ("refused", "solved")
     assert damaged["daqp"] == "not read" and "size 3 with 2 numbers" in damaged["why not read"]
-    shares = [row["share solved"] for row in found.profile if (row["kind"], row["solver"]) == ("frictionless", "lemke")]
-    assert len(shares) == len(FACTORS) and np.all(np.diff(shares) >= 0.0)
-    check, profile = collections({"given": tmp_path})
-    study = Study()
-    table = check.table(study)
     assert check.sentences(table)[0].verdict == MIXED and table.holds == (True, True, False)
-    assert len(profile.table(study).rows) == len(found.profile)
+    shares = profile.table(study).where(kind="frictionless", solver="lemke").column("share solved")
+    assert len(shares) == len(FACTORS) and np.all(np.diff(shares) >= 0.0)
     with pytest.raises(ArgumentError, match="folder"):
-        study_problems(tmp_path / "nowhere")
+        collections({"nowhere": tmp_path / "nowhere"})[0].table(Study())
 
 
 def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fails() -> None:

@@ -72,17 +72,6 @@ def test_failures_and_time_outs_are_records(judge: Judge) -> None:
     assert runs[2]["time [ms/s]"] == pytest.approx(3000.0 / SCENE.duration) and "3 s" in runs[2]["note"]
 
 
-def test_a_disturbed_set_up_does_not_shorten_a_run(judge: Judge) -> None:
-    """The least difference of run and set-up would be 0: the time of the run whose set-up was disturbed."""
-    spent = iter([(0.003, 0.001), (0.004, 0.001), (0.003, 0.003), (0.003, 0.001), (0.005, 0.002)])
-
-    def way(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float, float]:
-        return _true_motion(judge), *next(spent)
-
-    [run] = over_steps(SCENE, way, judge, (1e-3,), longest=1.0)
-    assert run["time [ms/s]"] == pytest.approx(2.0 / SCENE.duration)
-
-
 def test_impulses_meet_the_truth_better_with_every_step(judge: Judge) -> None:
     way = trajectories.methods()["IAPB, midpoint"]
     errors = [judge.errors(way(SCENE, step, SCENE.duration)[0])[0]["position"] for step in (8e-3, 1e-3, 1e-4)]

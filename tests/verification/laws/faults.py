@@ -41,13 +41,6 @@ def pulling_clipped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return back(parts, parts.u + parts.rows.T @ np.maximum(p, 0.0))
 
 
-def damped_formula(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Uses (W + λI)⁻¹ with a λ far above rounding."""
-    X = np.linalg.solve(M, J.T)
-    W = J @ X
-    return v - (1.0 + e) * (X @ np.linalg.solve(W + 1e-3 * np.eye(len(W)), J @ v))
-
-
 def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Gives 1e-4 more of the impulse than e requires; rationals, rounded once, give the same bits under every BLAS."""
     before = [Fraction(x) for x in v.tolist()]
@@ -68,7 +61,6 @@ def makes_stale_jacobian() -> Resolver:
 # name -> the law that must detect it, and how to make it
 BUGS: dict[str, tuple[str, Callable[[], Resolver]]] = {
     "lost one plus": ("restitution", lambda: lambda M, J, v, e: projecting(M, J, v, e)),
-    "missing half": ("restitution", lambda: lambda M, J, v, e: projecting(M, J, v, 0.5 * (1.0 + e))),
     "too loose rank": ("restitution", lambda: lambda M, J, v, e: projecting(M, J, v, 1.0 + e, cut=1e-2)),
     "forgotten mass": ("kinetic_energy", lambda: lambda M, J, v, e: projecting(np.eye(len(v)), J, v, 1.0 + e)),
     "reversed velocity": ("impulse_range", lambda: reversed_velocity),
@@ -76,13 +68,10 @@ BUGS: dict[str, tuple[str, Callable[[], Resolver]]] = {
     "pulling clipped": ("restitution", lambda: pulling_clipped),
     "printed formula": ("kinetic_energy", lambda: gram_pinv),
     "single precision": ("restitution", lambda: lambda *given: sound_resolver(*given).astype(np.float32).astype(float)),
-    "damped formula": ("restitution", lambda: damped_formula),
     "fails without contacts": ("kinetic_energy",
                                lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J))),
     "NaN without contacts": ("kinetic_energy",
                              lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) if len(J) else v + np.nan),
-    "column of velocities": ("kinetic_energy", lambda: lambda *given: sound_resolver(*given)[:, None]),
-    "gives up": ("kinetic_energy", lambda: gives_up),
     "stale Jacobian": ("restitution", makes_stale_jacobian),
     "returns too much": ("kinetic_energy", lambda: returns_too_much),
 }
@@ -178,7 +167,6 @@ SOUND = {"unilateral": (newton, poisson), "frictional": (moreau,)}
 # contract and name -> the law that must detect it, and the resolver
 PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
     ("unilateral", "wrong sign"): ("kinetic_energy", lambda M, J, v, e: _pushing(M, J, v, -(1.0 + e))),
-    ("unilateral", "forgotten mass"): ("kinetic_energy", lambda M, J, v, e: newton(np.eye(len(v)), J, v, e)),
     ("unilateral", "pulls"): ("pushing", sound_resolver),
     ("unilateral", "adhesive"): ("separating", _adhesive),
     ("unilateral", "squared restitution"): ("restitution", lambda M, J, v, e: newton(M, J, v, e * e)),

@@ -16,7 +16,8 @@ from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.impacts import ADVERSE_FAMILIES, Impacts, draw_impacts
 from verification.laws import ImpactCase, bulk_impacts
 from verification.laws.bounds import FACTORED
-from verification.laws.bulk import exact_energy, resolved
+from verification.laws.bulk import GAIN, exact_energy, resolved
+from verification.table import HOLDS
 
 DEPTH = 2000
 
@@ -24,15 +25,10 @@ DEPTH = 2000
 def test_the_gain_stays_below_ten_d_eps_root_kappa() -> None:
     study = bulk_impacts(DEPTH, seed=1)
     assert study.gain_error.max() < 1e-12
-    assert study.above_bound == 0 and study.worst_ratio <= 1.0
+    assert (study.gain <= study.bound).all()
     assert study.condition.max() > 1e11 and study.contacts.max() > 90 and study.coordinates.max() > 25
     assert (study.rank < np.minimum(study.contacts, study.coordinates)).any()
     assert study.residual.max() <= 1e-6
-
-
-def test_without_the_clamp_only_the_bound_of_cholesky_is_reached() -> None:
-    study = bulk_impacts(DEPTH, seed=0, clamp=False)
-    assert (study.gain <= np.maximum(study.bound, study.cholesky_bound)).all()
 
 
 def test_the_clamp_is_what_keeps_the_bound() -> None:
@@ -45,28 +41,22 @@ def test_the_clamp_is_what_keeps_the_bound() -> None:
     assert gains[0] > 10.0 * bound and gains[1] <= bound
 
 
-def test_the_printed_formula_exceeds_the_bound() -> None:
-    """By how much is up to the BLAS; in some two of a hundred impacts by more than the gain's own error."""
-    study = bulk_impacts(1500, seed=2, method="gram_pinv")
-    assert np.sum(study.gain - study.gain_error > study.bound) > 5
-
-
 def test_the_same_seed_gives_the_same_numbers_and_the_tables_add_up() -> None:
     seen: list[tuple[int, int]] = []
     first = bulk_impacts(300, seed=4, progress=lambda done, of: seen.append((done, of)))
     assert seen[-1] == (300, 300)
     assert np.array_equal(first.gain, bulk_impacts(300, seed=4).gain)
     *rows, total = first.by_condition()
-    assert sum(row[1] for row in rows) == total[1] == 300 and total[2] == first.gain.max()
+    assert sum(row["impacts"] for row in rows) == total["impacts"] == 300 and total[GAIN] == first.gain.max()
 
 
 @pytest.mark.parametrize("family", ADVERSE_FAMILIES)
 def test_no_impact_of_the_family_gains_energy_and_the_price_is_one_rounding(family: str) -> None:
     found = exact_energy(family, 3000)
-    assert found.gains == 0 and found.impacts == 3000
-    assert found.moved > 0.95 and found.holds is True  # 0 gains of impacts that leave v as it is would say nothing
-    assert found.cancelled <= (100 if family == "subnormal velocities" else 0)
-    assert np.isnan(found.price[2]) or found.price[2] <= 1.0
+    assert found["gains"] == 0 and found["impacts"] == 3000
+    assert found["moved"] > 0.95 and found[HOLDS] is True  # 0 gains of impacts that leave v as it is would say nothing
+    assert found["cancelled"] <= (100 if family == "subnormal velocities" else 0)
+    assert found["largest energy cost"] is None or found["largest energy cost"] <= 1.0
 
 
 @pytest.mark.parametrize("family", ADVERSE_FAMILIES[:4])
@@ -80,6 +70,6 @@ def test_a_family_whose_impacts_do_not_move_is_not_reproduced(monkeypatch: pytes
         return impacts.v.copy(), np.ones(len(impacts.v))
     monkeypatch.setattr("verification.laws.bulk.resolved", idle)
     found = exact_energy("ordinary", 100)
-    assert found.gains == 0 and found.moved == 0.0 and found.holds is None
-    assert verdict_of_families([True, found.holds]) == NOT_TESTABLE
+    assert found["gains"] == 0 and found["moved"] == 0.0 and found[HOLDS] is None
+    assert verdict_of_families([True, found[HOLDS]]) == NOT_TESTABLE
     assert verdict_of_families([False, None]) == REFUTED and verdict_of_families([True, True]) == REPRODUCED

@@ -7,7 +7,7 @@ import pytest
 
 from iapb import resolve_impact
 from verification.impacts import Floats, ImpactCase
-from verification.laws.bounds import FACTORED, KIT, LawCount, LawResidual
+from verification.laws.bounds import FACTORED, KIT
 from verification.laws.campaign import (
     IMPACTS,
     OF_ONE_CALL,
@@ -17,7 +17,6 @@ from verification.laws.campaign import (
     Subject,
     do_batch,
     drawn,
-    residuals,
     tried_laws,
 )
 from verification.laws.equality import LAWS, UNEQUAL_LAWS
@@ -46,7 +45,6 @@ def test_the_laws_of_one_call_ask_once_and_keep_a_copy() -> None:
 def test_every_law_has_its_part_of_the_impacts(part: str, laws: dict[str, object]) -> None:
     cases = 5000
     tried = [frozenset(tried_laws(part, index)) for index in range(cases)]
-    assert tried[:50] == [frozenset(tried_laws(part, index)) for index in range(50)]
     for name in laws:
         count = sum(name in one for one in tried)
         if name.removeprefix("unequal_") in OF_ONE_CALL:
@@ -55,28 +53,11 @@ def test_every_law_has_its_part_of_the_impacts(part: str, laws: dict[str, object
             assert abs(count - cases / ONE_IN) < 5.0 * np.sqrt(cases / ONE_IN)
 
 
-def test_a_case_asked_for_by_itself_is_put_to_every_law() -> None:
-    case = drawn(IMPACTS, 3, SUBJECT)
-    everything, chosen = residuals(IMPACTS, case, SUBJECT)[0], residuals(IMPACTS, case, SUBJECT, 3)[0]
-    assert set(OF_ONE_CALL) <= set(chosen) < set(everything)
-    assert all(everything[name] == residual for name, residual in chosen.items())
-
-
 def test_a_batch_counts_what_it_has_tried() -> None:
     outcome = do_batch(Batch(IMPACTS, 0, 40), SUBJECT)
     counts = {count.law: count for count in outcome.counts}
     assert counts["kinetic_energy"].checked == counts["arguments"].checked == 40
-    for name in LAWS:  # fewer where a law does not apply
-        most = sum(name in tried_laws(IMPACTS, index) for index in range(40))
-        assert (counts[name].checked if name in counts else 0) <= most
     assert not any(count.failures for count in outcome.counts)
-
-
-def test_the_worst_is_the_one_furthest_above_its_tolerance() -> None:
-    count = LawCount("any")
-    kept = [count.add(LawResidual("", value, 1.0)) for value in (0.5, np.nan, 2.0)]
-    assert kept == [True, False, False]
-    assert (count.checked, count.failures) == (3, 2) and count.worst is not None and np.isnan(count.worst.value)
 
 
 @pytest.mark.parametrize("index", [41452, 57210])

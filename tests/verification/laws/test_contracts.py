@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 from functools import partial
 
-import numpy as np
 import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
@@ -14,15 +13,12 @@ from tests.verification.laws.faults import (
     PUSHING,
     SOUND,
     TOO_MUCH,
-    moreau,
     newton,
     no_friction,
     returns_too_much,
 )
 from verification import check_passivity
-from verification.impacts import ImpactCase
 from verification.laws import CONTRACTS, sound_resolver
-from verification.laws.contracts import distance_from_cone
 
 SOUND_ONES = [(contract, resolver) for contract, resolvers in SOUND.items() for resolver in resolvers]
 SOUND_ONES.append(("unilateral", partial(resolve_impact, method="poisson")))
@@ -32,7 +28,7 @@ SOUND_ONES.append(("unilateral", partial(resolve_impact, method="poisson")))
 def test_textbook_resolvers_keep_all_laws_of_their_contract(contract: str, resolver: object) -> None:
     laws = [name for name in CONTRACTS[contract].laws if name != "exact_energy"]
     report = check_passivity(resolver, contract=contract, laws=laws, impacts=150)
-    assert report.passed, report
+    assert report.passed and ("not judged: how much friction" in report) == (contract == "frictional"), report
     assert all(verdict.checked > 0 for verdict in report.verdicts)
 
 
@@ -57,23 +53,6 @@ def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
     assert set(report.broken_laws) == set(broken)
 
 
-def test_the_distance_from_the_cones_is_known_for_one_contact_in_space() -> None:
-    """M = 1, normal along x: (|t| − μ n)/√(1 + μ²) outside the cone of μ = 1/2, in any direction."""
-    case = ImpactCase(np.eye(3), np.eye(3)[:1], np.ones(3), tangents=np.eye(3)[None, 1:], friction=np.array([0.5]))
-    for angle in np.linspace(0.0, 6.0, 13):
-        tangential = np.array([np.cos(angle), np.sin(angle)])
-        inside, outside = np.array([1.0, *(0.49999 * tangential)]), np.array([1.0, *(2.0 * tangential)])
-        assert distance_from_cone(case, inside) < 1e-9
-        assert distance_from_cone(case, outside) == pytest.approx(1.5 / np.sqrt(1.25), rel=1e-6)
-    assert distance_from_cone(case, np.array([-1.0, 0.0, 0.0])) == pytest.approx(1.0)
-
-
-def test_a_passed_report_says_what_it_does_not_judge() -> None:
-    report = check_passivity(moreau, contract="frictional", impacts=3)
-    assert report.passed and "not judged: how much friction there is with e > 0" in report
-    assert "not judged" not in check_passivity(newton, contract="unilateral", impacts=3)
-
-
 def test_gains_in_real_arithmetic_are_graded() -> None:
     """The engine gains in no bit; a sound resolver by rounding; 1e-4 too much of the impulse is severe."""
     exact = {"laws": ["exact_energy"], "impacts": 100, "search": 0}
@@ -91,24 +70,14 @@ def test_gains_in_real_arithmetic_are_graded() -> None:
         exec(report.counterexample_test + "\n\ntest_exact_energy()", {})
 
 
-def test_laws_are_chosen_by_name_in_the_contracts_order() -> None:
-    report = check_passivity(newton, contract="unilateral", laws=["pushing", "kinetic_energy"], impacts=5)
-    assert [verdict.law for verdict in report.verdicts] == ["kinetic_energy", "pushing"]
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"impacts": 0}, "impacts = 0: expected a whole number, 1 or more"),
-        ({"contract": "one-sided"}, "expected one of equality, unilateral, frictional"),
-        ({"laws": ["pushing"]}, "expected one of kinetic_energy, restitution, "),
-        ({"laws": ["pushin"], "contract": "unilateral"}, "did you mean pushing?"),
-        ({"laws": []}, "at least one of kinetic_energy"),
-        ({"contract": "frictional", "unequal_restitution": True}, "False with contract 'frictional'"),
-        ({"seed": -1}, "seed = -1: expected a whole number"), ({"seed": 1.5}, "seed = 1.5"), ({"seed": "3"}, "seed = "),
-        ({"laws": 1}, "laws = 1: expected names of laws"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    ({"impacts": 0}, "impacts = 0: expected a whole number, 1 or more"),
+    ({"contract": "one-sided"}, "expected one of equality, unilateral, frictional"),
+    ({"laws": ["pushin"], "contract": "unilateral"}, "did you mean pushing?"),
+    ({"laws": []}, "at least one of kinetic_energy"), ({"laws": 1}, "laws = 1: expected names of laws"),
+    ({"contract": "frictional", "unequal_restitution": True}, "False with contract 'frictional'"),
+    ({"seed": -1}, "seed = -1: expected a whole number"), ({"seed": 1.5}, "seed = 1.5"), ({"seed": "3"}, "seed = "),
+])  # fmt: skip
 def test_what_would_judge_nothing_is_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(ArgumentError) as caught:
         check_passivity(newton, **options)
@@ -123,13 +92,10 @@ def test_a_broken_report_raises_with_the_matrices_and_what_came_back() -> None:
     for line in ("  M = [[", "  J = [[", "  v = [", "  e = ", "  returned = [", "def test_pushing():"):
         assert line in text
     assert str(report) == repr(report) == text and isinstance(report, str)
-    check_passivity(newton, contract="unilateral", impacts=3).raise_if_broken()
-
-
-def test_a_report_travels_between_processes() -> None:
-    report = check_passivity(newton, contract="unilateral", impacts=3)
-    again = pickle.loads(pickle.dumps(report))
-    assert again == report and again.passed and again.verdicts[0].checked == 3
+    report = check_passivity(newton, contract="unilateral", laws=["pushing", "kinetic_energy"], impacts=3)
+    report.raise_if_broken()
+    assert [verdict.law for verdict in report.verdicts] == ["kinetic_energy", "pushing"]  # in the contract's order
+    assert pickle.loads(pickle.dumps(report)) == report  # travels between processes
 
 
 def test_a_counterexample_with_friction_shrinks_to_one_contact() -> None:

@@ -24,7 +24,13 @@ from verification.laws.resolver import Resolver
 from verification.methods import svd
 
 
-@pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, svd])
+def whole_numbers(M: Floats, J: Floats, v: Floats, e: Any) -> Any:
+    """A list of Python integers where the answer is whole, such as at e = −1: as good as an array."""
+    v_plus = sound_resolver(M, J, v, e)
+    return [int(x) if x == int(x) else float(x) for x in v_plus] if np.all(v_plus == np.round(v_plus)) else v_plus
+
+
+@pytest.mark.parametrize("resolver", [sound_resolver, resolve_impact, svd, whole_numbers])
 def test_sound_resolvers_pass(resolver: object) -> None:
     report = check_passivity(resolver, impacts=200)
     assert report.passed, report
@@ -38,6 +44,7 @@ def test_sound_resolvers_pass(resolver: object) -> None:
 def test_every_planted_bug_is_caught_by_its_law(law: str, make: Callable[[], Resolver]) -> None:
     report = check_passivity(make(), impacts=150, search=0)
     assert not report.passed and law in report.broken_laws, report
+    assert law != "arguments" or report.broken_laws == ("arguments",)
 
 
 def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() -> None:
@@ -48,32 +55,23 @@ def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() ->
     assert verdict.largest == pytest.approx(most, rel=1e-12)  # e = 1 and rows that see all of the motion: rounded once
     assert report.broken_laws[0] == report.counterexample_law == "kinetic_energy"
     assert (case.coordinates, case.contacts, case.restitution) == (1, 1, 1.0)
-    for found in (case, verdict.worst_case):
-        M, J, v, e = found.mass_matrix, found.contact_jacobian, found.velocity, found.restitution
-        plastic, factor = exact_impact(M, J, v, 0), (1 + Fraction(e)) * TOO_MUCH
-        share = 1 - plastic.energy_after / plastic.energy_before
-        gain = relative_energy_gain(M, v, returns_too_much(M, J, v, e))
-        assert gain == pytest.approx(float(factor * (factor - 2) * share), rel=1e-9)
-    assert verdict.worst.value == pytest.approx(gain, rel=1e-12)  # of the worst case
+    found = verdict.worst_case
+    plastic, factor = exact_impact(*found.arrays, 0), (1 + Fraction(found.restitution)) * TOO_MUCH
+    share = 1 - plastic.energy_after / plastic.energy_before
+    assert verdict.worst.value == pytest.approx(float(factor * (factor - 2) * share), rel=1e-9)
 
 
 @pytest.mark.parametrize("index", range(3))
-def test_shrinking_ends_follows_from_the_answers_alone_and_leaves_nothing_to_take(index: int) -> None:
-    """The resolver gains in exact rationals, so neither its answers nor the verdicts know a BLAS."""
+def test_shrinking_ends_and_leaves_nothing_to_take(index: int) -> None:
+    """The resolver gains in exact rationals, so neither its answers nor the verdicts depend on a BLAS."""
 
     def gains(case: ImpactCase) -> bool:
-        asked.append(case)
-        after = returns_too_much(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution)
+        after = returns_too_much(*case.arrays, case.restitution)
         return relative_energy_gain(case.mass_matrix, case.velocity, after) > 1e-6
 
-    asked: list[ImpactCase] = []
-    drawn = list(adverse_cases(np.random.default_rng(5)))[index]
-    smallest = shrink(drawn, gains)
+    smallest = shrink(list(adverse_cases(np.random.default_rng(5)))[index], gains)
     assert (smallest.coordinates, smallest.contacts, smallest.restitution) == (1, 1, 1.0)
     assert all(np.array_equal(x, np.round(x, 1)) for x in (smallest.mass_matrix, smallest.velocity))
-    first, count = smallest, len(asked)
-    again = shrink(drawn, gains)
-    assert repr(again) == repr(first) and len(asked) == 2 * count
 
 
 def test_the_smallest_impact_drawn_is_the_counterexample_where_shrinking_does_not_reach_it() -> None:
@@ -87,36 +85,17 @@ def test_the_smallest_impact_drawn_is_the_counterexample_where_shrinking_does_no
     assert largest is not None and largest.coordinates == 7
 
 
-def test_the_counterexample_can_be_pasted() -> None:
-    report = check_passivity(wrong_sign, impacts=50, search=50)
-    scope: dict[str, object] = {}
-    exec(report.counterexample_test, scope)
-    assert scope["resolver"] is wrong_sign
-    with pytest.raises(AssertionError, match="kinetic_energy"):
-        scope["test_kinetic_energy"]()
-    scope["resolver"] = sound_resolver
-    scope["test_kinetic_energy"]()
-
-
-@pytest.mark.parametrize(
-    ("answer", "complaint"),
-    [
-        (lambda M, J, v, e: v[:-1], "shape"),
-        (lambda M, J, v, e: v * np.nan, "not finite"),
-        (lambda M, J, v, e: "fast", "returned"),
-        (lambda M, J, v, e: 1 / 0, "ZeroDivisionError"),
-    ],
-)
-def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(answer: object, complaint: str) -> None:
-    report = check_passivity(answer, impacts=5, search=0)
-    assert not report.passed
-    assert complaint in report.verdict("kinetic_energy").fault
-
-
-def test_a_resolver_that_writes_on_its_input_is_told_so_and_nothing_else() -> None:
-    report = check_passivity(PLANTED_BUGS["arguments"].make(), impacts=60, search=0)
-    assert report.broken_laws == ("arguments",)
-    assert "BROKEN the arguments are left as they were" in str(report)
+@pytest.mark.parametrize(("answer", "complaint"), [
+    (lambda v: v[:-1], "shape"),
+    (lambda v: v * np.nan, "not finite"),
+    (lambda v: np.full(len(v), np.longdouble("1e400")), "not finite"),
+    (lambda v: "fast", "returned"),
+    (lambda v: [[1.0], [1.0, 2.0]], "returned list, which is no array"),
+    (lambda v: 1 / 0, "ZeroDivisionError"),
+])  # fmt: skip
+def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(answer: Any, complaint: str) -> None:
+    report = check_passivity(lambda M, J, v, e: answer(v), impacts=5, search=0)
+    assert not report.passed and complaint in report.verdict("kinetic_energy").fault and complaint in report
 
 
 def test_unequal_restitution_is_opt_in() -> None:
@@ -143,37 +122,16 @@ def test_a_slow_resolver_ends_unfinished_and_not_passed() -> None:
 
 
 @pytest.mark.parametrize(("law", "resolver"), [
-    ("momentum", PLANTED_BUGS["momentum"].make()), ("impulse_range", PLANTED_BUGS["impulse_range"].make()),
-    ("impulse_range", reversed_velocity),
-])
-def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(law: str, resolver: Resolver) -> None:
-    report = check_passivity(resolver, impacts=60, search=0)
-    case = report.verdict(law).worst_case
-    text = as_test(case, law, resolver=resolver) + f"\n\ntest_{law}()"
-    with pytest.raises(AssertionError, match=law):
-        exec(text, {})
-    exec(as_test(case, law, resolver=sound_resolver) + f"\n\ntest_{law}()", {})
-
-
-def test_a_partial_is_pasted_with_its_options() -> None:
-    report = check_passivity(partial(resolve_impact, budget=0), impacts=50, search=0)
-    assert str(report).startswith("resolve_impact(budget=0): FAILED")
-    with pytest.raises(AssertionError, match="restitution"):
-        exec(report.counterexample_test + "\n\ntest_restitution()", {})
-
-
-def test_the_same_seed_gives_the_same_report() -> None:
-    first, second = (check_passivity(sound_resolver, impacts=40, seed=3) for _ in range(2))
-    assert [v.worst for v in first.verdicts] == [v.worst for v in second.verdicts]
-
-
-@pytest.mark.parametrize(("answer", "said"), [
-    (lambda v: [[1.0], [1.0, 2.0]], "returned list, which is no array"),
-    (lambda v: np.full(len(v), np.longdouble("1e400")), "not finite"),
+    ("kinetic_energy", wrong_sign), ("momentum", PLANTED_BUGS["momentum"].make()), ("impulse_range", reversed_velocity),
+    ("restitution", partial(resolve_impact, budget=0)),
 ])  # fmt: skip
-def test_an_answer_that_is_no_velocity_is_a_fault_of_the_resolver(answer: Callable[[Any], Any], said: str) -> None:
-    report = check_passivity(lambda M, J, v, e: answer(v), impacts=3, search=0)
-    assert not report.passed and said in report
+def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(law: str, resolver: Resolver) -> None:
+    report = check_passivity(resolver, impacts=60, search=20)
+    for text in (report.counterexample_test, as_test(report.verdict(law).worst_case, law, resolver=resolver)):
+        name = text.split("def ")[1].split("(")[0]
+        with pytest.raises(AssertionError):
+            exec(f"{text}\n\n{name}()", {})
+    exec(as_test(report.verdict(law).worst_case, law, resolver=sound_resolver) + f"\n\ntest_{law}()", {})
 
 
 def test_gains_beyond_sixty_decades_are_judged() -> None:

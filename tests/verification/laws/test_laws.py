@@ -8,8 +8,8 @@ from hypothesis import given
 
 from iapb import resolve_impact
 from verification.impacts import ImpactCase
-from verification.laws.bounds import FACTORED, KIT, LawResidual
-from verification.laws.equality import LAWS
+from verification.laws.bounds import FACTORED, KIT, LawCount, LawResidual
+from verification.laws.equality import LAWS, restitution_residual
 from verification.laws.resolver import Resolver
 from verification.laws.strategies import impact_cases
 from verification.methods import damped, svd
@@ -34,6 +34,14 @@ def test_an_unknown_residual_never_passes() -> None:
     assert not LawResidual("any", np.inf, 1.0).passed
     assert not LawResidual("any", 1e-30, 0.0).passed
     assert LawResidual("any", 0.0, 0.0).passed and LawResidual("any", -1.0, 1e-9).passed
+    count = LawCount("any")
+    assert [count.add(LawResidual("", value, 1.0)) for value in (0.5, np.nan, 2.0)] == [True, False, False]
+    assert (count.checked, count.failures) == (3, 2) and np.isnan(count.worst.value)
+
+
+def test_a_rebound_too_weak_and_one_too_strong_are_the_same_residual() -> None:
+    case = ImpactCase(np.eye(1), np.eye(1), np.array([-1.0]), 0.5)
+    assert [restitution_residual(case, np.array([after])) for after in (0.25, 0.5, 0.75)] == [0.25, 0.0, 0.25]
 
 
 def test_rows_that_agree_to_noise_are_compared_up_to_that_noise() -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from reports.store import read_run, write_run
-from verification.laws.bounds import relative_gain
 from verification.laws.planted import PLANTED_TRAJECTORY_FAULTS, first_occasion
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
 from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory, judge_run
@@ -29,26 +28,6 @@ def test_random_trajectories_keep_every_law(drawn: list[SceneCase]) -> None:
             applied.add(law)
             assert residual.passed, (case, residual)
     assert applied >= set(TRAJECTORY_LAWS) - {"device_limits"}
-
-
-def test_scenes_in_space_have_boxes_balls_stacks_and_linkages_that_touch() -> None:
-    rng = np.random.default_rng(3)
-    drawn = [draw_spatial_scene(rng, STEPS) for _ in range(40)]
-    kinds = {shape["kind"] for case in drawn for body in case.values["bodies"] for shape in body["shapes"]}
-    joints = {body["joint"] for case in drawn for body in case.values["bodies"]}
-    assert kinds == {"box", "sphere"} and joints == {"free_flyer", "revolute", "spherical"}
-    stacked = next(case for case in drawn if any(body["name"] == "above" for body in case.values["bodies"]))
-    run = stacked.simulate()
-    names = np.array([*run.body_names, "world"])
-    first = slice(run.contacts.offsets[0], run.contacts.offsets[1])
-    met = {(names[a], names[b]) for a, b in zip(run.contacts.body_a[first], run.contacts.body_b[first], strict=True)}
-    assert {frozenset(pair) for pair in met} >= {frozenset({"below", "world"}), frozenset({"below", "above"})}
-
-
-def test_a_gain_beyond_the_range_of_double_double_is_judged_exactly() -> None:
-    before, after = np.array([1e70, 1e-5]), np.array([1e70, 1e-5])
-    assert relative_gain(np.eye(2), before, after) == 0.0
-    assert relative_gain(np.eye(2), before, 2.0 * after) == 3.0
 
 
 @pytest.mark.parametrize("law", TRAJECTORY_LAWS)

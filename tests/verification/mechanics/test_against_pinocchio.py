@@ -1,18 +1,17 @@
-"""The comparison with Pinocchio is complete, and notices a wrong mass and a wrong reading; absent robots are named."""
+"""The comparison with Pinocchio and the references is complete, and notices a wrong mass, reading, gap or e."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from iapb.mechanics.joints import KINDS
+from iapb.scene import find_scene, load_scene, scene_names
 from reference.rigid_body import model_from_urdf
 from verification.check import Study
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.mechanics import against_pinocchio as study
-from verification.mechanics.random_urdf import TYPES, random_urdf
 
 ARM = """<robot name="arm">
   <link name="base"/>
@@ -86,7 +85,20 @@ def test_impacts_agree_with_pinocchio_and_another_restitution_does_not(monkeypat
     assert study.IMPULSE_DYNAMICS.table(Study(), (100,)).passed is False
 
 
-def test_a_text_has_every_joint_type_and_repeats_with_its_seed():
-    text = random_urdf(np.random.default_rng(7), 12)
-    assert all(f'type="{kind}"' in text for kind in TYPES)
-    assert text == random_urdf(np.random.default_rng(7), 12)
+@pytest.mark.parametrize("name", scene_names())
+def test_engine_and_reference_find_the_same_contacts(name):
+    """Two codes of other operations agree to rounding on all but a few configurations."""
+    found = study.scene_difference(load_scene(find_scene(name)), configurations=30)
+    assert found["with other contacts"] <= 3
+    assert max(found[key] for key in ("M", "B + G", "frame Jacobians")) <= 1e-13
+    assert max(found[key] for key in ("gap [m]", "normal", "contact row")) <= 1e-12
+
+
+def test_a_contact_that_is_off_is_noticed(monkeypatch):
+    find = study.find_contacts
+
+    def shifted(*given):
+        return (found := find(*given))._replace(gap=found.gap + 1e-10)
+
+    monkeypatch.setattr(study, "find_contacts", shifted)
+    assert study.scene_difference(load_scene(find_scene("peg_corner")), configurations=3)["gap [m]"] >= 0.99e-10

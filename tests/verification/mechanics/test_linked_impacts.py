@@ -57,11 +57,8 @@ def test_cradle_depends_on_which_rows_collide(n: int) -> None:
     np.testing.assert_allclose(every, [2.0 / n - 1.0] + [2.0 / n] * (n - 1), atol=CONSERVED)
     np.testing.assert_allclose(first, [0.0, 1.0] + [0.0] * (n - 2), atol=CONSERVED)
     np.testing.assert_allclose(handed_on, [0.0] * (n - 1) + [1.0], atol=CONSERVED)
-
-
-def test_cradle_per_body_rows_reverse_the_striker_as_from_a_wall() -> None:
-    velocity = chosen(outcomes(cradle(5)), "(13)", "all")
-    np.testing.assert_allclose(velocity[:, 0], [-1.0, 0.0, 0.0, 0.0, 0.0], atol=CONSERVED)
+    per_body = chosen(found, "(13)", "all")[:, 0]  # as from a wall
+    np.testing.assert_allclose(per_body, [-1.0] + [0.0] * (n - 1), atol=CONSERVED)
 
 
 def test_bernoulli_struck_at_once_is_symmetric_and_in_turn_is_not() -> None:
@@ -74,10 +71,3 @@ def test_bernoulli_struck_at_once_is_symmetric_and_in_turn_is_not() -> None:
     first, second = (chosen(found, "event-driven", f"{k}, then") for k in (0, 1))
     assert abs(first[0, 1]) > 0.1  # the striker is thrown aside, to the side of the ball struck second
     np.testing.assert_allclose(first[[0, 2, 1]] * [1.0, -1.0], second, atol=CONSERVED)
-
-
-def test_bernoulli_third_row_holds_the_struck_balls_together() -> None:
-    found = list(outcomes(bernoulli()))
-    three, two = chosen(found, "(12)", "all"), chosen(found, "(12)", "approaching")
-    assert abs(three[1, 1] - three[2, 1]) < CONSERVED
-    assert abs(two[1, 1] - two[2, 1]) > 0.5

@@ -6,7 +6,7 @@ import numpy as np
 
 from reports.figures import RECIPES
 from reports.figures.figure import Figure, draw
-from reports.figures.linked_impacts import BERNOULLI, CRADLE, outcomes
+from reports.figures.mechanics import BERNOULLI, CRADLE, outcomes
 from verification.check import Study
 from verification.mechanics import linked_impacts
 from verification.mechanics.mechanics import mechanics

@@ -7,7 +7,6 @@ import pytest
 
 from iapb.scene import find_scene, load_scene
 from verification.mechanics import operating as study
-from verification.mechanics.hand_paths import PATHS
 
 
 @pytest.fixture(scope="module")
@@ -15,11 +14,7 @@ def scene():
     return load_scene(find_scene(study.SCENE))
 
 
-def test_lengths_are_those_of_the_scene(scene):
-    assert {body.name: 2 * body.center_of_mass[0] for body in scene.bodies} == study.LENGTHS
-
-
-@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("path", study.PATHS)
 @pytest.mark.parametrize("body", study.LENGTHS)
 def test_any_link_is_led_through_the_singular_pose(scene, path, body):
     row = study.operate(scene, study.Grip(body, study.LENGTHS[body]), path, 2.0, 1000.0)
@@ -50,13 +45,3 @@ def test_a_fault_or_a_number_that_is_not_finite_fails():
     assert study.holds(whole)
     assert not study.holds(whole | {"largest joint speed [rad/s]": np.inf})
     assert not study.holds({})  # broken off
-
-
-def test_paths_start_where_the_hand_is_and_have_their_length():
-    start = np.array([0.3, 0.2])
-    for make in PATHS.values():
-        path = make(start, 0.5)
-        np.testing.assert_allclose(path.place(0.0), start)
-        ways = np.linspace(0.0, path.length, 2001)
-        places = np.array([path.place(s) for s in ways])
-        assert np.linalg.norm(np.diff(places, axis=0), axis=1).sum() == pytest.approx(path.length, rel=1e-3)

@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError
 from iapb.mechanics.integrators import INTEGRATORS
 from verification.mechanics import tumbling
-from verification.mechanics.commutator_free import COMMUTATOR_FREE_4
-from verification.mechanics.torque_free import TorqueFreeBody
+from verification.mechanics.tumbling import COMMUTATOR_FREE_4
 
 H = 1e-4  # [s] of central differences: their error is about H^2
 BODIES = tumbling.MOTIONS.values()
@@ -30,23 +28,12 @@ def test_the_closed_form_solves_the_equations(body, time):
     assert 0.5 * moments @ rate**2 == pytest.approx(body.energy, rel=1e-12)
 
 
-def test_rates_repeat_after_a_period():
-    for body in BODIES:
-        np.testing.assert_allclose(body.rates(body.period), body.rates(0.0), atol=1e-12)
-
-
-@pytest.mark.parametrize("moments", [(2.0, 1.0, 3.0), (1.0, 1.0, 2.0)])
-def test_what_the_formulas_do_not_cover_is_refused(moments):
-    with pytest.raises(ArgumentError, match="moments"):
-        TorqueFreeBody(moments, 1.0, 2.0)
-    with pytest.raises(ArgumentError, match="third_rate"):
-        TorqueFreeBody((1.0, 2.0, 3.0), 5.0, 0.1)
-
-
-@pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
-def test_every_integrator_keeps_its_order_in_the_compiled_step(method):
-    body = tumbling.MOTIONS["turning over"]
-    rows = list(tumbling._halved(body, method, tumbling.path_compiled, 2))
+@pytest.mark.parametrize("method", [*INTEGRATORS.values(), COMMUTATOR_FREE_4], ids=[*INTEGRATORS, "commutator_free_4"])
+def test_every_integrator_keeps_its_order_on_rotations(method):
+    in_python = method is COMMUTATOR_FREE_4
+    body = tumbling.MOTIONS["wobbling" if in_python else "turning over"]
+    path = tumbling.path_by_python if in_python else tumbling.path_compiled
+    rows = list(tumbling._halved(body, method, path, 2))
     assert rows[-1]["order"] == pytest.approx(method.group_order, abs=tumbling.ORDER_TOLERANCE)
     assert min(rows[-1][name] or np.inf for name in tumbling.DRIFT_ORDERS) > (
         method.group_order - tumbling.ORDER_TOLERANCE)
@@ -58,13 +45,6 @@ def test_the_step_in_python_is_the_compiled_one(method):
     python, compiled = (path(body, method, 200) for path in (tumbling.path_by_python, tumbling.path_compiled))
     for ours, theirs in zip(python, compiled, strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-11)
-
-
-def test_the_commutator_free_method_keeps_its_fourth_order_on_rotations():
-    body, method = tumbling.MOTIONS["wobbling"], COMMUTATOR_FREE_4
-    rows = list(tumbling._halved(body, method, tumbling.path_by_python, 2))
-    assert rows[-1]["order"] == pytest.approx(4, abs=tumbling.ORDER_TOLERANCE)
-    assert max(rows[-1]["energy drift [relative]"], rows[-1]["momentum drift [relative]"]) < 1e-7
 
 
 def test_a_body_of_another_shape_does_not_converge():

@@ -5,7 +5,7 @@ import random
 from fractions import Fraction
 
 from verification.proofs import layout
-from verification.proofs.cases import all_hold, completed, read_case
+from verification.proofs.cases import all_hold, completed, matrix_of, read_case
 from verification.proofs.numbers import spring_energy_after
 from verification.proofs.statement import Statement
 
@@ -33,7 +33,7 @@ def test_both_statements_hold_on_the_exact_solution_of_two_contacts() -> None:
         a, after = [], []
         for (stiff, damp, gap, j), force in zip(contacts, forces, strict=True):
             n, n_after = max(-gap, Fraction(0)), max(-gap - h * j * v, Fraction(0))
-            case = {name: ((value,),) for name, value in {
+            case = {name: matrix_of([[value]]) for name, value in {
                 "K": stiff, "B": damp, "h": h, "φ": gap, "γ": j * v, "φ⁺": gap + h * j * v, "n": n, "n⁺": n_after,
                 "f": force}.items()}
             assert all_hold((*contact.given, *contact.conclusions), completed(case, contact.definitions))

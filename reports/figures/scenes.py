@@ -1,0 +1,242 @@
+"""Overview of all scenes (the parts of the energy over time, the deepest overlap), and pictures of those in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iapb.run import Run
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.geometry import (
+    Floats,
+    Placement,
+    View,
+    body_placements,
+    bounds,
+    cuboid,
+    cuboid_of_inertia,
+    links,
+    placement,
+    placement_of,
+    plane_frame,
+    view,
+)
+from reports.figures.numbers import format_number
+from reports.figures.plot import Canvas, Plot
+from reports.figures.style import (
+    AMBER,
+    BLUE,
+    FORCE,
+    INK,
+    LINK,
+    MUTED,
+    PANEL,
+    PEG,
+    PURPLE,
+    RULE,
+    SKY,
+    VERMILION,
+    WALL,
+    LineStyle,
+)
+from verification.table import Table
+
+# heading of the table -> (text of the legend, colour), from the bottom of the stack
+LAYERS = (
+    (("kinetic",), "in motion", BLUE),
+    (("potential", "springs"), "in height and contact springs", SKY),
+    (("lost impacts",), "lost in impacts", VERMILION),
+    (("lost damping",), "lost in contact damping", AMBER),
+    (("lost friction",), "lost in friction", PURPLE),
+)
+LEGEND = {**{text: LineStyle(color, "s", width=0.0) for _, text, color in LAYERS},
+          "all energy so far": LineStyle(INK, width=1.2), "impact": LineStyle(FORCE, "|", width=0.0)}  # fmt: skip
+_WIDTH, _ROW, _HEAD, _FOOT = 9.2, 0.46, 0.34, 0.12  # inches
+# heading -> left edge and width
+_COLUMNS = {"energy over time, each scene to its own scale": (0.235, 0.52), "deepest overlap": (0.785, 0.15)}
+_THIN = 3e-3  # share of a strip's height under which a layer cannot be seen and is not drawn
+_STILL = 1e-9  # share of the heights' energy under which all motion is rounding, and is said and not drawn
+_DEPTHS = (1e-3, 5.0)  # [mm] ends of the logarithmic scale
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One scene: `layers` (5, n) and `line` (n,) [J] over `time` (n,) [s].
+
+    struck : whether an impact occurred since the previous instant; at_rest : whether all motion is within rounding
+    """
+
+    scene: str
+    time: NDArray[np.float64]
+    layers: NDArray[np.float64]
+    line: NDArray[np.float64]
+    struck: NDArray[np.bool_]
+    at_rest: bool
+
+
+def strips(numbers: Table) -> tuple[Strip, ...]:
+    """Return the strips of all scenes from the table of energies over time."""
+    found = []
+    for name in dict.fromkeys(numbers.column("scene")):
+        mine = numbers.where(scene=name)
+        column = {key: np.array(mine.column(key), dtype=float) for key in numbers.keys[1:]}
+        stored = column["potential"] + column["springs"]
+        at_rest = np.ptp(column["given"]) + column["kinetic"].max() <= _STILL * np.abs(stored).max()
+        lowest = stored.min()  # heights count from the lowest: only changes of a potential mean anything
+        layers = np.array([sum(column[heading] for heading in headings) for headings, _, _ in LAYERS])
+        layers[1] -= lowest
+        line = column["kinetic"][0] + stored[0] - lowest + column["given"]
+        found.append(Strip(name, column["time"], layers, line, column["impacts"] > 0, bool(at_rest)))
+    return tuple(found)
+
+
+@recipe("every-scene", "scene-ledger/contact", "scene-ledger/books over time")
+def scenes_ledger(contacts: Table, over_time: Table) -> Drawn:
+    """Draw a row for every scene: its name, the energy over time, and the deepest overlap as a bar."""
+    shown, facts = strips(over_time), {row["scene"]: row for row in contacts.records()}
+    height = _HEAD + _ROW * len(shown) + _FOOT
+    row = _ROW / height
+    bottoms = [1.0 - _HEAD / height - (place + 1) * row for place in range(len(shown))]
+    frames = [(left, bottom + 0.14 * row, width, 0.78 * row) for bottom in bottoms for left, width in _COLUMNS.values()]
+    with Plot("every-scene", (_WIDTH, height), bare=True, frames=frames) as plot:
+        for text, (left, _) in _COLUMNS.items():
+            plot.drawing.text(left, 1.0 - 0.55 * _HEAD / height, text, va="center", fontsize=9)
+        for bottom, strip, energy, depth in zip(bottoms, shown, plot.each[::2], plot.each[1::2], strict=True):
+            fact, place = facts[strip.scene], bottom + 0.55 * row
+            space = "in space, " if fact["dimensions"] == 3 else ""
+            told = f"{format_number(fact['energy exchanged'], 2)} J, {space}{fact['how it ends']}"
+            plot.drawing.text(0.006, place, strip.scene.replace("_", " "), va="bottom", fontsize=9)
+            plot.drawing.text(0.006, place, told, va="top", fontsize=7.5, color=MUTED)
+            _energy(energy, strip)
+            value, (low, high) = fact["most penetration"], np.log10(_DEPTHS)
+            length = max(np.log10(value) - low, 0.0) / (high - low) if value > 0.0 else 0.0
+            depth.barh(0.0, length, height=0.42, color=LINK)
+            depth.text(length + 0.03, 0.0, f"{format_number(value, 2)} mm" if value else "touches nothing", va="center",
+                       fontsize=8)  # fmt: skip
+            depth.set(xlim=(0.0, 1.0), ylim=(-0.5, 0.5))
+    deepest = max(facts.values(), key=lambda fact: float(fact["most penetration"]))
+    words = (f"{len(shown)} strips of energy over time. Deepest overlap {deepest['most penetration']:.2g} mm in "
+             f"{deepest['scene']}.")  # fmt: skip
+    return Drawn([Panel(plot.svg, words, wide=True)], contacts, LEGEND)
+
+
+def _energy(axes: Any, strip: Strip) -> None:
+    """Fill the layers upwards, losses on top, and draw the line over them."""
+    if strip.at_rest:
+        axes.text(0.0, 0.5, "nothing moves", va="center", fontsize=8, color=MUTED)
+        return
+    top = max(strip.line.max(), strip.layers.sum(axis=0).max())
+    edge = np.zeros_like(strip.time)
+    for layer, (_, _, color) in zip(strip.layers, LAYERS, strict=True):
+        if np.abs(layer).max() > _THIN * top:
+            axes.fill_between(strip.time, edge, edge + layer, facecolor=color, edgecolor="none", alpha=0.75)
+            edge = edge + layer
+    axes.plot(strip.time, strip.line, color=INK, linewidth=1.2)
+    axes.plot(strip.time[strip.struck], np.full(strip.struck.sum(), -0.1 * top), "|", color=FORCE, markersize=4.5)
+    axes.axhline(0.0, color=MUTED, linewidth=0.5)
+    axes.set(xlim=(0.0, strip.time[-1]), ylim=(-0.2 * top, 1.08 * top))
+
+
+# Scenes in space
+
+_MARGIN = 0.06
+_MARK = 0.04  # radius of the marked corner, as a share of the box's longest side
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The viewpoint of a scene, and the `moments` of its run that are drawn, as fractions of its duration."""
+
+    run: str
+    seen: View
+    moments: tuple[float, ...]
+    floor: float = 0.0  # half side [m] of the piece of a half-space that is drawn; 0 = none
+    walls_around: float = 0.0  # half side [m] to which boxes of the static world are cut; 0 = whole
+
+
+SIGHTS = (
+    Sight("space/peg_hole", view(-1.2, 0.2), (0.0, 0.07, 1.0), walls_around=0.075),
+    Sight("space/arm_obstacles", view(-0.75, 0.5), (0.0, 0.4, 1.0), floor=0.5),
+    Sight("space/tumbling_body", view(-1.0, 0.4), (0.0, 0.45, 1.0)),
+)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A ring or line of points (n, 3) [m] to draw; bodies hide 70 % of what lies behind them."""
+
+    points: Floats
+    nearness: float  # what is nearer to the reader is drawn later
+    face: str = PEG
+    edge: str = INK
+    width: float = 0.9
+    alpha: float = 0.7
+
+
+@recipe("scenes-space", *(sight.run for sight in SIGHTS))
+def scenes_space(*runs: Run) -> Drawn:
+    """Draw every scene at the moments of its `Sight`, to one scale."""
+    panels = []
+    for sight, run in zip(SIGHTS, runs, strict=True):
+        scene, flat = run.scene_resolved, sight.seen.flat
+        steps = [round(share * run.steps) for share in sight.moments]
+        drawn = [sorted(_pieces(sight, scene, run.pose[step]), key=lambda piece: piece.nearness) for step in steps]
+        low, high = bounds([flat(piece.points) for each in drawn for piece in each], _MARGIN)
+        for step, each in zip(steps, drawn, strict=True):
+            with Canvas(f"scenes-space-{run.scene_name}-{step}", low, high, PANEL) as canvas:
+                for order, piece in enumerate(each):
+                    x, y, over = *flat(piece.points).T, {"zorder": 2 + 1e-3 * order}
+                    if len(x) == 2:
+                        canvas.axes.plot(x, y, color=piece.edge, linewidth=piece.width, **over)
+                        continue
+                    canvas.axes.fill(x, y, facecolor=piece.face, edgecolor="none", alpha=piece.alpha, **over)
+                    canvas.axes.fill(x, y, facecolor="none", edgecolor=piece.edge, linewidth=piece.width,
+                                     joinstyle="round", **over)  # fmt: skip
+                canvas.hand(scene, run.pose[step], 0.16 * float(max(high - low)), flat)
+            moment = f"{run.time[step]:.2f} s"
+            panels.append(Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.",
+                                f"{run.scene_name}, {moment}"))
+    return Drawn(panels)
+
+
+def _pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Piece]:
+    """Yield the faces, discs and lines of a scene at a pose that face the reader."""
+    seen, places = sight.seen, body_placements(scene, pose)
+    shapes: list[tuple[Placement, Mapping[str, Any], dict[str, Any]]] = [
+        (places[body["name"]] @ placement_of(shape), shape, {})
+        for body in scene["bodies"] for shape in body["shapes"]]
+    for wall in scene["walls"]:
+        if wall["kind"] != "half_space":
+            wall = _cut(wall, sight.walls_around)
+            shapes.append((placement_of(wall), wall, {"face": WALL, "edge": MUTED, "alpha": 0.35}))
+        elif sight.floor:  # a square, moved to the reach of an arm, x > 0
+            square = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+            yield Piece(plane_frame(wall).of(sight.floor * square) + [0.7 * sight.floor, 0.0, 0.0], -np.inf, RULE,
+                        MUTED, 0.6, 1.0)  # fmt: skip
+    for line in links(scene, pose):
+        yield Piece(np.array(line), seen.depth(line), edge=LINK, width=4.0)
+    for body in scene["bodies"]:
+        if not body["shapes"] and body["joint"] == "free_flyer":
+            size, center = cuboid_of_inertia(body), np.asarray(body["center_of_mass"], dtype=float)
+            own = places[body["name"]] @ placement(center)
+            shapes.append((own, {"kind": "box", "size": size}, {}))
+            yield Piece(seen.disc(own.of(size / 2.0), _MARK * max(size)), np.inf, FORCE, FORCE, 0.5, 1.0)
+    for own, shape, look in shapes:
+        rings = [seen.disc(own.origin, shape["radius"])] if shape["kind"] == "sphere" else [
+            ring for ring in cuboid("", own, shape["size"]).sides if seen.faces_reader(ring)]  # fmt: skip
+        for ring in rings:
+            yield Piece(ring, seen.depth(own.origin), **look)
+
+
+def _cut(wall: Mapping[str, Any], reach: float) -> Mapping[str, Any]:
+    """Return a static box, cut to a square with half side `reach` about the origin."""
+    if not reach or wall["kind"] != "box":
+        return wall
+    half, center = np.asarray(wall["size"]) / 2.0, np.asarray(wall["center"], dtype=float)
+    low, high = center - half, center + half
+    low[:2], high[:2] = np.maximum(low[:2], -reach), np.minimum(high[:2], reach)
+    return {**wall, "size": high - low, "center": (low + high) / 2.0}

@@ -1,0 +1,168 @@
+"""What a command shows: its answer as sentences and tables or as JSON, and the progress of its work."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from iapb.compiling import compiling_told, to_stderr
+from reports.store.keys import plain
+
+if TYPE_CHECKING:
+    from verification.table import Table
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of sentences.")]
+WIDTH = 80  # of the lines
+SILENCE = 30.0  # [s] between two lines of a log
+_WIDEST = 26  # of a column; longer texts go on in the next line
+_GAP = "  "  # between columns
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command returns: `facts` are printed with --json, otherwise `lines` are; exit statuses do not differ."""
+
+    facts: Any
+    lines: Sequence[str | Table]
+    status: int = 0
+
+    def text(self, json_: bool) -> str:
+        """Return what the command prints; in JSON NaN and infinity are null."""
+        if json_:
+            finite = json.loads(json.dumps(plain(self.facts)), parse_constant=lambda _: None)
+            return json.dumps(finite, indent=1, ensure_ascii=False)
+        return "\n".join(line if isinstance(line, str) else table_text(line) for line in self.lines)
+
+
+def sentence(text: str, mark: str = "") -> str:
+    """Return a wrapped sentence after its mark; the following lines are indented by the length of the mark."""
+    return textwrap.fill(text, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark), break_on_hyphens=False,
+                         break_long_words=False)  # fmt: skip
+
+
+def table_text(table: Table, keys: int = 1) -> str:
+    """Return a table as text. A table that is too wide continues below, with its first `keys` columns repeated."""
+    columns = [_wrapped(title, [_text(row[k], table.digits) for row in table.cells])
+               for k, title in enumerate(table.titles)]  # fmt: skip
+    shown = [column for k, column in enumerate(columns) if k < keys or any(cell != ["-"] for cell in column[1:])]
+    blocks = [shown[:keys]]
+    for column in shown[keys:]:
+        if len(blocks[-1]) > keys and sum(map(_width, [*blocks[-1], column])) > WIDTH + len(_GAP):
+            blocks.append(shown[:keys])
+        blocks[-1] = [*blocks[-1], column]
+    return "\n\n".join(map(_printed, blocks))
+
+
+def _text(value: Any, digits: int) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
+def _wrapped(title: str, texts: list[str]) -> list[list[str]]:
+    """Return heading and cells as lines; the heading is as wide as the widest cell or its longest word with unit."""
+    whole = re.sub(r"\[[^]]*\]$", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title)
+    cells = [textwrap.wrap(text, _WIDEST) or [""] for text in texts]
+    widest = max(map(len, [*(line for cell in cells for line in cell), *whole.split()]), default=1)
+    return [textwrap.wrap(whole, max(widest, 1)), *cells]
+
+
+def _width(column: list[list[str]]) -> int:
+    return max(len(line) for cell in column for line in cell) + len(_GAP)
+
+
+def _printed(columns: list[list[list[str]]]) -> str:
+    widths, lines = [_width(column) - len(_GAP) for column in columns], list[str]()
+    for number, row in enumerate(zip(*columns, strict=True)):
+        height = max(map(len, row))
+        full = [[""] * (height - len(cell)) + cell if number == 0 else cell + [""] * (height - len(cell))
+                for cell in row]  # headings stand on the rule
+        for first, *others in zip(*full, strict=True):
+            placed = [text.rjust(width) for text, width in zip(others, widths[1:], strict=True)]
+            lines.append(_GAP.join([first.ljust(widths[0]), *placed]).replace("\N{NO-BREAK SPACE}", " ").rstrip())
+        if number == 0:
+            lines.append("-" * min(WIDTH, sum(widths) + len(_GAP) * (len(widths) - 1)))
+    return "\n".join(lines)
+
+
+def duration(seconds: float) -> str:
+    """Return a time as text in a suitable unit."""
+    for unit, factor in (("s", 1.0), ("ms", 1e3)):
+        if seconds * factor >= 1.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} µs"
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun: "1 collision", "2 collisions"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+@contextmanager
+def stage_progress(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, int, int], None]]:
+    """Show which stage is running and how far it is: progress(stage, done, total); also that kernels are compiled.
+
+    On a terminal these are bars: the stage `begun` is shown before its first report, `transient` bars vanish at the
+    end. In a log these are lines, without one at the start of the stage `begun`.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal or console.is_dumb_terminal:
+        with compiling_told(to_stderr), _logged(begun) as log:
+            yield log
+        return
+    name = TextColumn("{task.description}", markup=False)  # a scene's name may hold brackets
+    # Only output to the same terminal is printed above the bars: a redirected stdout must not be sent to stderr.
+    bars = Progress(name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console, transient=transient,
+                    redirect_stdout=sys.stdout.isatty())  # fmt: skip
+    with bars, compiling_told(bars.console.print):
+        tasks = {begun: bars.add_task(begun, total=None)} if begun else {}
+
+        def progress(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done, total=total)
+
+        yield progress
+
+
+@contextmanager
+def _logged(begun: str) -> Iterator[Callable[[str, int, int], None]]:
+    """Write a line when a stage begins, and every SILENCE seconds, as a single step may take minutes, how far it is."""
+    stages, start, over = {begun: (0, 0)}, time.monotonic(), Event()
+
+    def progress(stage: str, done: int, total: int) -> None:
+        if stage not in stages:
+            to_stderr(f"{stage} ...")
+        stages[stage] = done, total
+
+    def remind() -> None:
+        before = set[str]()
+        while not over.wait(SILENCE):
+            going = {stage: far for stage, far in stages.copy().items() if far[0] < far[1]}
+            for stage in before.intersection(going):
+                done, total = going[stage]
+                to_stderr(f"{stage}: {done:,} of {total:,} after {(time.monotonic() - start) / 60.0:.1f} min")
+            before = set(going)
+
+    thread = Thread(target=remind, daemon=True)
+    thread.start()
+    try:
+        yield progress
+    finally:
+        over.set()
+        thread.join()

@@ -1,0 +1,528 @@
+"""The command line, in process: what it refuses, and each command once, from its words to its answer and its files."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import SceneError
+from reports import cli, show
+from reports.live.replay import read_live, replay
+from reports.store.keys import content_hash
+from reports.store.runs import read_run
+from verification.cost.impacts import Choice
+from verification.finding import REPRODUCED, Finding, Part
+from verification.proofs.coq_development import Theorem
+from verification.table import Column, Table, titled
+
+ROOT = Path(__file__).parents[2]
+SLOPE = ROOT / "tests" / "verification" / "worlds" / "slope.yaml"
+HEAVY = {"numpy", "numba", "cvxpy", "pinocchio", "sympy", "matplotlib", "h5py", "scipy", "coal", "flint", "hypothesis"}
+SHORT = ("peg_corner", "--set", "duration=0.4")
+STUDY = "name: two\ntitle: Two\nscene: two_discs\nworlds: [IAPB]\ngrid:\n  contact.restitution: [0.0, 0.5]\n"
+WRONG_SCENE = """\
+name: wrong
+rate: -5
+duration: 1.0
+bodies:
+  - {name: peg, joint: hinge, mass: 1.0, inertia: 1.0}
+contact: {stiffness: soft}
+"""
+DEVICES = """\
+def broken(scene):
+    raise RuntimeError("no cable")
+
+class Mute:
+    def read(self):
+        raise RuntimeError("no answer")
+    def apply(self, force):
+        pass
+
+def mute(scene):
+    return Mute()
+"""
+
+
+@pytest.fixture
+def iapb(capsys):
+    """Run a command line; return (status, what it printed, what it complained about)."""
+
+    def call(*arguments):
+        capsys.readouterr()
+        return cli.main([str(argument) for argument in arguments]), *capsys.readouterr()
+
+    return call
+
+
+@pytest.fixture
+def answer(iapb):
+    """Run a command with --json; return its status and the object."""
+
+    def call(*arguments):
+        status, out, _ = iapb(*arguments, "--json")
+        return status, json.loads(out)
+
+    return call
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """Work in a folder with files that are not what they seem."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bare").mkdir()
+    for name, text in {"wrong.yaml": WRONG_SCENE, "ball.yaml": "", "notes.h5": "not HDF5", "notes.md": "notes",
+                       "text.npz": "no archive", "empty.npz": "", "own_devices.py": DEVICES}.items():  # fmt: skip
+        (tmp_path / name).write_text(text)
+    np.savez(tmp_path / "half.npz", v_minus=np.ones((1, 2)))
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "half.npz").read_bytes()[:99])
+    archive(tmp_path / "whole.npz")
+    (tmp_path / "link.out").symlink_to(tmp_path / "whole.npz")
+    (tmp_path / "hard.out").hardlink_to(tmp_path / "whole.npz")
+    return tmp_path
+
+
+def archive(path, gain=False):
+    """Two impacts of a recorder elsewhere; the second may gain one unit in the last place."""
+    v = np.array([[1.0, -2.0], [0.3, 0.7]])
+    after = -v
+    after[1, 0] = np.nextafter(after[1, 0], -np.inf) if gain else after[1, 0]
+    np.savez(path, mass_matrix=np.diag([2.0, 3.0]), v_minus=v, v_plus=after)
+    return path
+
+
+def listed(command):
+    """The keys that the documents list for a command: the words before what stands in brackets."""
+    [row] = re.findall(rf"^\| `{command}` \| (.*) \|$", (ROOT / "docs" / "scenes.md").read_text("utf-8"), re.M)
+    return {key.strip() for key in re.sub(r"\([^)]*\)|;.*", "", row).split(",")}
+
+
+REFUSED = [  # status, command line, what the refusal says
+    (2, "walk", "Usage"), (2, "run", "Usage"), (2, "", "Usage"), (2, "run peg_corner --speed 3", "No such option"),
+    (2, "inspect", "Usage"), (2, "inspect run.h5 --impacts -3", "--impacts"), (2, "verify --seed -1", "--seed"),
+    (2, "verify --scene elastic_cradle", "--simulator"), (2, "verify --laws restitution --full", "not with --full"),
+    (2, "sweep corner_tilt --workers 99999999", "--workers"), (2, "live peg_corner --port 99999999", "--port"),
+    (2, "compare --worlds PB", "give a SCENE"), (2, "compare --against PB", "give a SCENE"),
+    (2, "compare --only-problems", "--problems"), (2, "store check . --delete", "only with the action gc"),
+    (1, "run wrong.yaml", "wrong.yaml:2:"), (1, "run wrong.yaml", "bodies[0].joint"),
+    (1, "effects wrong.yaml", "wrong.yaml:6:"), (1, "effects wrong.yaml", "contact.stiffness"),
+    (1, "run no_such_scene", "no_such_scene"), (1, "run peg_cornr", "did you mean peg_corner?"),
+    (1, "run bal.yaml", "did you mean ball.yaml?"), (1, "run scenes/peg_cornr.yaml", "did you mean peg_corner?"),
+    (1, "run peg_corner --world best", "world = 'best': expected one of IAPB, PB, "),
+    (1, "run peg_corner --world iapb", "did you mean IAPB?"), (1, "run peg_corner --rendering clip", "'clip'"),
+    (1, "run peg_corner --world PB --rendering spread", "rendering = 'spread'"),
+    (1, "run peg_corner --set friction", "--set = 'friction': expected path=value"),
+    (1, "run peg_corner --set contact.friction=-1", "contact.friction"),
+    (1, "run peg_corner --set contact.frictoin=1", "frictoin"), (1, "run peg_corner --set mass=[1", "--set"),
+    (1, "run peg_corner --set bodies.pegg.mass=1", "did you mean peg?"),
+    (1, "run peg_corner --out ''", "--out = '': expected a value that is not empty"),
+    (1, "run peg_corner --out=", "--out = '': expected"), (1, "run ''", "argument 2 = '': expected a value"),
+    (1, "run peg_corner --out /dev/null/folder", "/dev/null/folder: "),
+    (1, "inspect no_such_file.h5", "no_such_file.h5: no such file"), (1, "inspect .", ".: a folder, not a file"),
+    (1, "inspect notes.h5", "notes.h5"), (1, "store check ''", "argument 3 = ''"),
+    (1, "store gc notes.md", "a folder of results: gc is not for one file"),
+    (1, "store repair notes.md", "a folder of results: repair is not for one file"), (1, "store gc .", "iapb-store"),
+    *((1, f"store {action} /", "not a whole file system") for action in ("check", "repair", "gc", "again")),
+    *((1, f"certify {name}.npz", "no archive") for name in ("text", "empty", "cut")),
+    (1, "certify half.npz", "mass_matrix, v_plus missing"), (1, "certify whole.npz absent.npz --export hard", "absent"),
+    *((1, f"certify whole.npz --export {name}", "--export") for name in ("whole.npz", "link.out", "hard.out", ".")),
+    (1, "compare --only-problems --problems bare", "a folder with problem files"),
+    (1, "compare --export /dev/null/folder", "/dev/null/folder: Not a directory"),
+    (1, "compare peg_corner --worlds ideel", "did you mean ideal?"), (1, "compare --out x.csv", "ends in .json"),
+    (1, "compare peg_corner --against best", "against = 'best'"), (1, "sweep corner_tlt", "did you mean corner_tilt?"),
+    (1, "prove no_such_statement", "no_such_statement"), (1, "prove theorem1", "did you mean theorem_1?"),
+    (1, "reproduce --figure fig7", "did you mean fig07?"), (1, "report diff here there", "report = 'here'"),
+    (1, "bench --budget 50", "budget = '50': expected a time with its unit, e.g. 50us"),
+    (1, "effects peg_corner --measure --world ideal", "--measure needs a world of the compiled engine"),
+    (1, "verify --resolver nothing", "package.module:function"), (1, "verify --resolver no_such:f", "can be imported"),
+    (1, "verify --resolver json:dumps", "resolver = 'dumps': expected a function called as (mass_matrix, con"),
+    (1, "verify --resolver iapb:resolve_impct", "which has no resolve_impct; did you mean resolve_impact?"),
+    (1, "verify --simulator mujocco", "did you mean mujoco?"),
+    (1, "verify --simulator iapb --scene elastic_cradel", "did you mean elastic_cradle?"),
+    (1, "live peg_corner --rate inf", "--rate = inf: expected"), (1, "live peg_corner --rate 0", "--rate = 0.0"),
+    (1, "live peg_corner --seconds nan", "--seconds = nan"), (1, "live peg_corner --world heaven", "'heaven'"),
+    (1, "live peg_corner --out /dev/null/folder", "/dev/null/folder: Not a directory"),
+    *((1, f"live peg_corner --device {device}", said) for device, said in (
+        ("omega", "--device"), ("no_such:connect", "imported"), (":connect", "--device"), ("json:", "--device"),
+        ("own_devices:broken", "no cable"), ("own_devices:mute", "no answer"), ("own_devices:brokn", "broken?"))),
+    (1, "live two_discs --device simulated", "a scene with a hand"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("status", "words", "said"), REFUSED, ids=lambda value: str(value) or "nothing")
+def test_a_refusal_names_the_value_and_what_is_expected_and_changes_no_file(status, words, said, iapb, here):
+    before = {path: path.read_bytes() for path in here.rglob("*") if path.is_file()}
+    ended, out, err = iapb(*shlex.split(words))
+    assert ended == status and said in " ".join((out + err).split()) and "Traceback" not in out + err
+    assert "\niapb: " in f"\n{err}" if status == 1 else "Usage" in out + err
+    assert before == {path: path.read_bytes() for path in here.rglob("*")
+                      if path.is_file() and "__pycache__" not in path.parts}  # fmt: skip
+
+
+@pytest.mark.parametrize(("status", "words", "said"), [(1, "run no_such_scene", "no_such_scene"), (2, "run", "scene"),
+                                                       (2, "run peg_corner --speed 3", "No such option")])
+def test_with_json_an_error_is_an_object_too(status, words, said, answer):
+    ended, found = answer(*words.split())
+    assert ended == found["status"] == status and said in found["error"]
+
+
+def test_debug_shows_the_traceback(here):
+    with pytest.raises(SceneError):
+        cli.main(["--debug", "run", "wrong.yaml"])
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_ctrl_c_ends_with_130_and_a_fault_of_ours_is_not_hidden(error, iapb, monkeypatch):
+    def stopped(**_):
+        raise error
+
+    monkeypatch.setattr("reports.commands.schema.scene_schema", stopped)
+    if error is ZeroDivisionError:
+        with pytest.raises(error):
+            iapb("schema")
+    else:
+        assert iapb("schema") == (130, "", "iapb: stopped; files that were complete stay\n")
+
+
+@pytest.mark.parametrize("of_ctrl_c", [signal.SIG_DFL, signal.SIG_IGN], ids=["in front", "in the background"])
+def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(of_ctrl_c, tmp_path):
+    command = [sys.executable, "-m", "reports.cli", "live", "peg_corner", "--seconds", "600", "--out", str(tmp_path)]
+    start = partial(signal.signal, signal.SIGINT, of_ctrl_c)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=start) as process:
+        assert "Under way" in process.stdout.readline()
+        time.sleep(2.0)
+        process.terminate()
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 130 and "Stopped: interrupted" in out and len(list(tmp_path.glob("*.h5"))) == 2
+
+
+def loaded_by(words):
+    """Names of the modules that a command loads, in a process of its own."""
+    code = f"import sys; from reports.cli import main; main({words!r}); print('LOADED', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    text, loaded = done.stdout.split("LOADED")
+    return text, loaded.split()
+
+
+def test_help_loads_nothing_heavy_and_a_run_no_verification_nor_solver(tmp_path):
+    text, loaded = loaded_by(["--help"])
+    assert not HEAVY & {name.partition(".")[0] for name in loaded} and all(command in text for command in cli.COMMANDS)
+    _, loaded = loaded_by(["run", *SHORT, "--out", str(tmp_path)])
+    assert not [name for name in loaded if name.startswith(("verification", "reference.complementarity"))]
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_every_command_explains_itself_in_the_words_of_the_list(command, iapb):
+    status, out, _ = iapb(command, "--help")
+    explained = getattr(import_module(f"reports.commands.{command}"), command).__doc__
+    assert status == 0 and "Usage" in out and explained.partition("\n")[0] == cli.COMMANDS[command]
+
+
+def test_version_scenes_schema_and_completion(iapb, answer, monkeypatch, capsys):
+    assert iapb("--version")[:2] == (0, f"iapb {import_module('iapb').__version__}\n")
+    assert answer("scenes")[1]["peg_corner"]
+    parts = json.loads(iapb("schema")[1])["$defs"]
+    assert all("bodies" in parts[kind]["properties"] for kind in ("Scene", "SpatialScene"))
+    monkeypatch.setenv("_IAPB_COMPLETE", "complete_bash")
+    for words, place, expected in (("iapb run peg_c", 2, "peg_corner"), ("iapb che", 1, "check"),
+                                   ("iapb run --wor", 2, "--world")):
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(place))
+        with pytest.raises(SystemExit, match="0"):  # typer ends the process that a shell asks
+            iapb()
+        assert expected in capsys.readouterr().out.split()
+
+
+def test_run_stores_a_run_a_second_call_reads_it_and_inspect_tells_what_is_in_it(iapb, answer, tmp_path):
+    status, out, _ = iapb("run", *SHORT, "--out", tmp_path)
+    [file] = tmp_path.glob("*.h5")
+    written = file.stat().st_mtime_ns
+    assert status == 0 and "computed in" in out and str(file) in out
+    status, ran = answer("run", *SHORT, "--out", tmp_path)
+    assert status == 0 and set(ran) == listed("run") and Path(ran["file"]) == file
+    assert "read from its file" in iapb("run", *SHORT, "--out", tmp_path)[1] and file.stat().st_mtime_ns == written
+    for more in (("--set", "contact.stiffness=900"), ("--world", "PB"), ("--rendering", "spread")):
+        iapb("run", *SHORT, *more, "--out", tmp_path)
+    assert len(list(tmp_path.glob("*.h5"))) == 4
+    status, out, _ = iapb("inspect", file, "--impacts", "1")
+    for text in ("peg_corner", "Complete.", "The first 1 of", "impact_loss", "friction", "run key", "content hash"):
+        assert status == 0 and text in out, text
+    status, seen = answer("inspect", file, "--impacts", 2)
+    assert status == 0 and len(seen["impacts"]) == min(2, seen["collisions"])
+    assert {name: seen[name] for name in ("end", "steps")} == {name: ran[name] for name in ("end", "steps")}
+    assert {"energy", "effects", "provenance", "run_key", "content_hash", "broken law"} <= set(seen)
+
+
+def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(iapb, answer, tmp_path, monkeypatch):
+    @contextmanager
+    def interrupting(*_, **__):
+        def progress(*_):
+            raise KeyboardInterrupt
+
+        yield progress
+
+    monkeypatch.setattr("reports.commands.run.stage_progress", interrupting)
+    status, out, err = iapb("run", "peg_corner", "--out", tmp_path)
+    [file] = tmp_path.glob("*.partial")
+    assert status == 130 and str(file) in out and "Stopped: interrupted" in out and "Traceback" not in err
+    assert not list(tmp_path.glob("*.h5")) and "Partial: interrupted." in iapb("inspect", file)[1]
+    monkeypatch.undo()
+    assert iapb("run", "peg_corner", "--out", tmp_path)[0] == 0  # done from the start, and the partial file is gone
+    assert len(list(tmp_path.glob("*.h5"))) == 1 and not list(tmp_path.glob("*.partial"))
+    walls = [{"name": f"wall_{n}", "kind": "half_plane", "point": [0.05 * n, 0], "normal": [-n, 0]} for n in (1, -1)]
+    status, out, _ = iapb("run", "peg_corner", "--world", "PB", "--set", "contact.stiffness=1e9", "--set",
+                          "contact.damping=0", "--set", f"walls={json.dumps(walls)}", "--out", tmp_path)  # fmt: skip
+    assert status == 1 and "Stopped: the" in out and "range of numbers" in out
+    wrong = ("run", "peg_corner", "--set", "duration=0.5", "--set", "contact.stiffness=1e8", "--out", tmp_path / "x")
+    status, out, err = iapb(*wrong)
+    assert status == 3 and "Warning: contact.stiffness" in err and "not to be trusted, because its energy is" in out
+    assert answer(*wrong)[1]["distrust"] and "not to be trusted" in iapb("inspect", *tmp_path.glob("x/*.h5"))[1]
+
+
+@pytest.mark.parametrize(("arguments", "law", "effect"), [
+    (("bar_on_posts",), "impulse-augmented penalty", "unequal_restitution"),
+    (("sliding_box", "--world", "IAPB-friction"), "impulse-augmented penalty with impact friction", "impact_friction"),
+])  # fmt: skip
+def test_extensions_of_the_law_run_by_name_and_say_so_in_the_file(arguments, law, effect, iapb, tmp_path):
+    status, out, _ = iapb("run", *arguments, "--out", tmp_path, "--set", "duration=0.02")
+    run = read_run(next(tmp_path.glob("*.h5")))
+    assert status == 0 and f": {law}, coupling none." in out and run.law == law
+    assert effect in {row.name for row in run.effects if row.active}
+
+
+def test_check_warns_with_a_number_and_says_what_a_rigid_world_costs(iapb, answer):
+    status, out, _ = iapb("check", "peg_corner")
+    assert status == 0 and "the step holds contact.stiffness <= 2.62e+05 N/m" in out and "Nothing wrong" in out
+    status, found = answer("check", "peg_corner", "--set", "contact.stiffness=1e9")
+    assert status == 3 and set(found) == listed("check") and found["limits"]["contacts"] == 2
+    assert found["warnings"][0].keys() == {"kind", "where", "text"} and found["warnings"][0]["kind"] == "stiffness"
+    many = [{"name": f"b{i}", "joint": "planar", "mass": 1.0, "inertia": 1e-3, "position": [0.11 * i, 0.05, 0.0],
+             "shapes": [{"kind": "circle", "radius": 0.05}]} for i in range(330)]
+    base = ("wall_1d", "--set", "hand=null", "--set", "device=null", "--set", "couplings={}", "--set", "walls=[]")
+    some = (*base, "--set", f"bodies={json.dumps(many[:60])}", "--set", "duration=10")
+    remarks = answer("check", *some, "--world", "ideal")[1]["remarks"]
+    assert any("1,770 contacts of 180 coordinates in each step, about" in said for said in remarks)
+    assert not answer("check", *some)[1]["remarks"]
+    every = (*base, "--set", f"bodies={json.dumps(many)}", "--set", "duration=0.01", "--world", "ideal")
+    status, found = answer("check", *every)
+    assert status == 3 and "size" in {one["kind"] for one in found["warnings"]}
+    assert iapb("run", *every, "--out", "/nonexistent")[0] == 1
+
+
+def test_effects_lists_each_with_its_reason(iapb, answer):
+    status, out, _ = iapb("effects", "peg_corner", "--world", "PB")
+    assert status == 0 and "the law 'penalty' does not use it" in " ".join(out.split())
+    status, out, _ = iapb("effects", "peg_corner")
+    assert status == 0 and "without it" in out and "Off, because" in out
+    status, found = answer("effects", "peg_corner", "--world", "ideal")
+    assert status == 0 and set(found) == {"scene", "world", "effects"}
+    assert {one["name"]: one["ignores"] for one in found["effects"]}["penalty_stiffness"] == "stiffness"
+
+
+def test_certify_judges_runs_and_archives_and_exports_them_as_integers(iapb, answer, here):
+    iapb("run", "newton_cradle", "--set", "duration=0.4", "--out", "runs")
+    status, out, _ = iapb("certify", "runs", "whole.npz")
+    assert status == 0 and "of 2 files: 0 gained energy (exact)" in out and ".h5" in out
+    status, out, _ = iapb("certify", archive(here / "gain.npz", gain=True))
+    assert status == 1 and "2 impacts of 1 file: 1 gained energy (exact)" in out
+    assert "Impact 1 of" in out and "Fraction" in out
+    np.savez("other.npz", mass_matrix=[[1.0]], v_minus=[[1.5]], v_plus=[[-1.5]])
+    status, found = answer("certify", "runs", "other.npz", "other.npz", "--export", "impacts.txt")
+    assert status == 0 and found["passed"] and len(found["files"]) == 2  # what is named twice is judged once
+    head, *impacts, end = whole = Path("impacts.txt").read_text(encoding="utf-8").splitlines()
+    run = read_run(next(here.glob("runs/*.h5")))
+    assert head == "iapb impacts 2" and len(impacts) == len(run.impacts.step) + 1 > 1 and end == f"end {len(impacts)}"
+    size, *numbers = map(float, impacts[-1].split())
+    assert size == 1.0 and [m * 2.0**e for m, e in zip(numbers[::2], numbers[1::2], strict=True)] == [1.0, 1.5, -1.5]
+    d, *numbers = map(int, impacts[0].split())
+    after = [np.ldexp(float(m), e) for m, e in zip(numbers[-2 * d::2], numbers[-2 * d + 1::2], strict=True)]
+    assert after == run.impacts.v_plus[0].tolist()
+    assert iapb("certify", "other.npz", "absent.npz", "--export", "impacts.txt")[0] == 1
+    assert Path("impacts.txt").read_text(encoding="utf-8").splitlines() == whole and not list(here.glob(".*"))
+
+
+def test_store_checks_repairs_cleans_and_simulates_again(iapb, answer, here):
+    iapb("run", *SHORT, "--out", "runs")
+    assert iapb("store", "check", "notes.md")[:2] == (1, "notes.md: foreign: no file of iapb: no seal, and nothing "
+                                                          "that says so\n1 files: 1 foreign\n")
+    assert answer("store", "check", "runs")[1]["count"] == {"whole": 1}
+    status, found = answer("store", "again", "runs")
+    assert status == 0 and found["same"] == 1 == len(found["files"])
+    assert answer("store", "gc", "runs")[1]["removed"] is False
+    assert set(answer("store", "repair", "runs")[1]) == {"files", "count", "logs", "aside"}
+    damaged = next(here.glob("runs/*.h5"))
+    damaged.write_bytes(damaged.read_bytes()[:5000])
+    status, found = answer("store", "check", "runs")
+    assert status == 1 and found["count"] == {"damaged": 1}
+
+
+def standing_still(mass_matrix, contact_jacobian, velocity, restitution):
+    """A resolver that breaks the law of restitution."""
+    return 0.0 * velocity
+
+
+def test_verify_tests_a_resolver_and_judges_its_counterexample_again(answer, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    status, found = answer("verify", "--impacts", 20, "--laws", "kinetic_energy")
+    assert status == 0 and set(found) == listed("verify") and found["passed"]
+    assert [one["law"] for one in found["laws"]] == ["kinetic_energy"]
+    again = ("verify", "--full", "--impacts", 20, "--trajectories", 0, "--out", tmp_path)
+    status, found = answer(*again, "--resolver", "tests.reports.test_commands:standing_still")
+    assert status == 1 and not found["passed"] and set(found) == listed("verify --full")
+    assert {one["law"]: one["failures"] > 0 for one in found["laws"]["impacts"]}["restitution"]
+    status, found = answer("verify", "--recheck", found["counterexamples"][0], "--allow-code")
+    assert status == 1 and not found["passed"] and not found["laws"][0]["passed"]
+
+
+def test_prove_prints_a_proof_and_says_what_coq_refuses(iapb, answer, monkeypatch):
+    status, out, _ = iapb("prove", "theorem_1")
+    assert status == 0 and "proved" in out
+    status, found = answer("prove", "theorem_1")
+    assert set(found) == listed("prove") and [one["verdict"] for one in found["statements"]] == ["proved"]
+    refused = Theorem("sign_kept", "yes", ("an_axiom_of_its_own",))
+    monkeypatch.setattr("reports.commands.prove.theorems", lambda: (refused,))
+    monkeypatch.setattr("reports.commands.prove.all_proofs", lambda: ())
+    status, found = answer("prove", "--second-tool")
+    assert status == 1 and found["theorems"][0]["verdict"] == "refused"
+    assert found["theorems"][0]["axioms"] == ["an_axiom_of_its_own"]
+
+
+def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, monkeypatch):
+    choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
+    asked = []
+    monkeypatch.setattr("reports.commands.bench.which_method", lambda *given: asked.append(given) or (choice,))
+    status, found = answer("bench", "--budget", "50us", "--contacts", "7", "--coordinates", "3")
+    assert asked == [(pytest.approx(5e-5), 7, 3)]
+    assert status == 0 and found["choices"][0]["method"] == "factored"
+    tables = {"one": Table((Column("x"),), ((1,),))}
+    finding = Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)
+    monkeypatch.setattr("reports.commands.bench.haptic_study", lambda *_: finding)
+    monkeypatch.setattr("reports.commands.bench.work_precision", lambda **_: Table((Column("y"),), ((2,),)))
+    monkeypatch.setattr("reports.commands.bench.choices", lambda _: Table(()))
+    status, found = answer("bench")
+    assert status == 0 and set(found) == listed("bench")
+    assert found["tables"] == {"one": [{"x": 1}], "methods on problems": [{"y": 2}]}
+    assert "• as asked for: s" in iapb("bench")[1]
+
+
+def test_reproduce_draws_one_figure(answer, tmp_path):
+    status, found = answer("reproduce", "--figure", "fig02", "--out", tmp_path)
+    assert status == 0 and found["drawings"] and all(Path(each).is_file() for each in found["drawings"])
+
+
+def test_sweep_computes_every_point(answer, tmp_path):
+    (tmp_path / "two.yaml").write_text(STUDY, encoding="utf-8")
+    status, found = answer("sweep", tmp_path / "two.yaml", "--workers", 1, "--out", tmp_path / "sweeps")
+    assert status == 0 and set(found) == listed("sweep")
+    assert len(found["points"]) == 2 == found["computed"] and Path(found["table"]).is_file()
+
+
+@pytest.mark.parametrize("device", [(), ("--device", "simulated", "--no-budget")], ids=str)
+def test_live_says_how_it_kept_to_the_clock_and_what_it_stored_can_be_done_again(iapb, answer, tmp_path, device):
+    status, out, _ = iapb("live", "peg_corner", "--seconds", "0.1", "--set", "bodies.peg.velocity=[-0.3,0.4,0]",
+                          "--out", tmp_path, *device)  # fmt: skip
+    for text in ("100 ticks at 1000 Hz", "A tick's work took", "It began late by", "deadline", "collision"):
+        assert status == 0 and text in out, text
+    timetable, path = sorted(tmp_path.glob("*.h5"), key=lambda path: "timetable" not in path.name)
+    assert str(path) in out and str(timetable) in out
+    stored = read_live(path)
+    assert stored.run.steps == 100 == len(stored.timetable.due) and stored.run.dt == 1e-3 == stored.timetable.period
+    assert stored.device == ("iapb.haptics.device:SimulatedDevice" if device else "")
+    assert np.all(np.diff(stored.timetable.due) >= 1e-3 - 1e-9)
+    assert content_hash(replay(stored)) == content_hash(stored.run)
+    status, found = answer("live", "peg_corner", "--seconds", 0.05, "--rate", 512, "--out", tmp_path)
+    assert status == 0 and {"ticks", "missed", "run", "timetable", "stopped"} <= set(found)
+
+
+def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb, here):
+    door = ("compare", SLOPE.with_name("door.yaml"), "--set", "duration=0.15", "--worlds", "IAPB", "--against", "IAPB")
+    status, out, err = iapb(*door, "--impacts", "1")
+    assert status == 0 and max(map(len, out.splitlines())) <= show.WIDTH, err
+    rows = [line.split() for line in out.splitlines() if " none " in line or " friction " in line]
+    by_solver = {row[0]: row[2:6] for row in rows}
+    assert by_solver["lemke"] == by_solver["nsgs"] == ["1", "1", "0", "0"]
+    if "pinocchio_pgs" in by_solver:
+        assert "pinocchio_pgs refused 1, such as impact 1 at 0.115 s, μ = 0.2: takes contacts of three" in " ".join(
+            out.split())
+    assert Path("out/compare/door.json").is_file() and Path("out/compare/door.svg").is_file()
+    place, slope = Path("mine/slope.json"), ("compare", SLOPE, "--set", "duration=0.05", "--worlds")
+    status, out, err = iapb(*slope, "IAPB,ideal,ideal-friction", "--out", place)
+    lines = out.splitlines()
+    assert status == 0 and max(map(len, lines)) <= show.WIDTH and len(lines) < 60, err
+    for said in ("Closest to ideal-friction is ", "ideal ignores friction, stiffness, damping.", f"Stored in {place}"):
+        assert said in out
+    found = json.loads(place.read_text(encoding="utf-8"))
+    assert found["details"]["worlds"] == "IAPB, ideal, ideal-friction" and found["parts"][0]["name"] == "runs"
+    assert set(found["tables"]) == {"worlds", "over time"} and len(found["tables"]["over time"]["rows"]) == 3 * 51
+    assert [row[0] for row in found["tables"]["worlds"]["rows"]] == ["IAPB", "ideal", "ideal-friction"]
+    picture = place.with_suffix(".svg").read_text(encoding="utf-8")
+    assert "ideal-friction (reference)" in picture and "penetration [mm]" in picture
+
+
+def test_compare_lists_problem_files_with_who_did_not_solve_them(iapb, answer, here):
+    Path("given").mkdir()
+    Path("given/two.lcp").write_text("2\n2 1\n1 2\n-5 -6\n")
+    Path("given/bad.lcp").write_text("2\nno number\n")
+    Path("given/none.lcp").write_text("1\n-1\n-1\n")  # 0 <= z, −z − 1 >= 0: no z
+    status, out, _ = iapb("compare", "--only-problems", "--problems", "given")
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line[:4] in ("two.", "none", "bad.")}
+    assert status == 0 and max(map(len, out.splitlines())) <= show.WIDTH
+    assert int(rows["two.lcp"][2]) > 3 and rows["none.lcp"][2] == "0" and rows["bad.lcp"][3:5] == ["not", "read:"]
+    stored = json.loads(Path("out/compare/problems.json").read_text(encoding="utf-8"))
+    assert set(stored) == listed("compare") and set(stored["tables"]) == {"given", "profile"}
+    assert answer("compare", "--export", "ours")[1]["problems"] == len(list(here.glob("ours/*.hdf5"))) > 3
+
+
+def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():
+    wide = titled(("name", *(f"quantity {k} [N s]" for k in range(12))), [("a", *map(float, range(12)))], 3)
+    lines = show.table_text(wide).splitlines()
+    assert max(map(len, lines)) <= show.WIDTH and lines.count("") == 1
+    assert [line for line in lines if line.startswith("a ")][1].split()[-1] == "11"
+    assert lines[1].split()[:4] == ["name", "0", "[N", "s]"]
+    folded = titled(("name", "empty", "why"), [("a", None, "words " * 12), ("b", None, None)])
+    lines = show.table_text(folded).splitlines()
+    assert "empty" not in lines[0] and sum("words" in line for line in lines) == 3
+    wrapped = show.sentence("word " * 40, "• ").splitlines()
+    assert max(map(len, wrapped)) <= show.WIDTH and wrapped[0].startswith("• ") and wrapped[1].startswith("  word")
+    facts = {"a": np.array([1.0, np.nan]), 2: Part("s", REPRODUCED), "c": Path("x"), "d": (np.int64(3), True, None)}
+    found = json.loads(show.Answer(facts, []).text(json_=True), parse_constant=pytest.fail)
+    assert found["a"] == [1.0, None] and found["2"]["verdict"] == REPRODUCED and found["c"] == "x"
+    assert found["d"] == [3, True, None]
+
+
+def test_a_log_tells_of_a_stage_that_begins_and_of_one_that_goes_on(monkeypatch, capsys):
+    monkeypatch.setattr(show, "SILENCE", 0.01)
+    said = ""
+    with show.stage_progress("known") as tell:
+        tell("known", 3, 3)
+        tell("a stage [with brackets]", 2, 1000)
+        for _ in range(1000):
+            time.sleep(0.01)
+            said += capsys.readouterr().err
+            if said.count("\n") > 1:
+                break
+    assert said.startswith("a stage [with brackets] ...\na stage [with brackets]: 2 of 1,000 after 0.0 min\n")
+
+
+@pytest.mark.parametrize("term", ["xterm", "dumb"])
+def test_on_a_terminal_there_are_bars_unless_it_is_a_dumb_one(monkeypatch, capsys, term):
+    monkeypatch.setitem(os.environ, "FORCE_COLOR", "1")
+    monkeypatch.setitem(os.environ, "TERM", term)
+    with show.stage_progress() as tell:
+        tell("a stage [of work]", 1, 3)
+        print("a result")
+    out, err = capsys.readouterr()
+    assert out == "a result\n" and "a stage [of work]" in err
+    assert ("\x1b[" in err) == (term == "xterm") and ("a stage [of work] ..." in err) == (term == "dumb")

@@ -1,0 +1,305 @@
+"""The stages of the evidence: stored once, read as they were; what fails costs one row or one stage, and is named."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import verification.claims
+from iapb.scene import find_scene, load_scene
+from reports.commands import reproduce
+from reports.evidence import depends, gather, runs, topics
+from reports.evidence import stage as stages
+from reports.evidence.stage import Stage
+from reports.evidence.topics import Plan
+from reports.figures.figure import Figure, Panel, Recipe
+from reports.pages.records import Evidence, FailedCases
+from reports.provenance import UNKNOWN, dispatched, linear_algebra, this_machine
+from reports.report import keep_answer, kept_answer, report_key
+from reports.runner import Runner
+from reports.store import keys
+from tests.reports.joined import joined
+from verification.claims import arm
+from verification.cost import effects, impacts
+from verification.finding import NOT_COMPUTED, VERDICTS, Failure, Finding, Part, failure_of, finding_of
+from verification.hard_cases import judge
+from verification.hard_cases import study as hard_cases
+from verification.table import Column, Table
+
+Patch = pytest.MonkeyPatch
+ANY = (None, math.nan, math.inf, -math.inf, -0.0, 0.1, 5e-324, 3, -(2**53) - 1, 2**70, True, False,
+       "", "é", "nan", "True", "None", np.float32(0.5), np.int64(3), np.bool_(True))  # fmt: skip
+FINDING = finding_of(
+    "mechanics", "Title", "Asked?", "Answered.",
+    (Part("s", VERDICTS[0], name="p", held=1, decided=2, fails="x", timed=True),),
+    {"judged": Table((Column("n", "N s", condition=True, part=True), Column("time", "s", timed=True),
+                      Column("said", prose=True)), ((1, 0.5, "a"), (2, None, "b"), (3, math.inf, "c")),
+                     (True, None, False), 3, "a note", True),
+     "empty": Table((Column("row"),)), "bare": Table(())})  # fmt: skip
+
+
+def nothing(*_: Any) -> None:
+    """No progress."""
+
+
+def filled(folder: Path, compute: Callable[..., Any], kind: Any = Finding, name: str = "mechanics") -> Stage:
+    return Stage(folder / "tables", name, kind, "quick").fill(Runner(folder / "runs"), compute)
+
+
+def test_records_are_computed_once_and_come_back_with_every_type(tmp_path: Path) -> None:
+    calls: list[int] = []
+    table = Table((Column("a/b", "m"), Column("row")), tuple((cell, 0) for cell in ANY))
+    for kind, records in ((Finding, FINDING), (Table, table)):
+        first, again = (filled(tmp_path, lambda _, own=records: calls.append(1) or own, kind, kind.__name__)
+                        for _ in range(2))
+        assert repr(first.records) == repr(again.records) == repr(replace(records, rows=tuple(
+            (keys.plain(cell), 0) for cell in ANY)) if kind is Table else records)
+    assert len(calls) == 2 and len(list((tmp_path / "tables").glob("*.h5"))) == 2
+
+
+def test_a_stage_that_is_read_lists_the_runs_of_the_one_that_made_them(tmp_path: Path) -> None:
+    scene = load_scene(find_scene("peg_corner")).with_values({"duration": 0.4})
+
+    def compute(failures: list[Failure]) -> Finding:
+        runner(scene, "IAPB")
+        runner.user = "C07"
+        runner(scene, "PB")
+        return FINDING
+
+    runner = Runner(tmp_path / "runs")
+    made = Stage(tmp_path, "mechanics", Finding, "quick").fill(runner, compute)
+    read = Stage(tmp_path, "mechanics", Finding, "quick").fill(Runner(tmp_path / "runs"), compute)
+    assert made.runs == read.runs == runner.used
+    commands = [(run.used_by, run.command) for run in read.runs.values()]
+    assert commands == [((user,), f"iapb run peg_corner --set duration=0.4 --world {world}")
+                        for user, world in (("mechanics", "IAPB"), ("C07", "PB"))]  # fmt: skip
+    assert {run.made_on for run in read.runs.values()} == {this_machine()}
+
+
+def test_every_claim_is_checked_by_astage_of_the_report() -> None:
+    stages_of_claims = {topics.stage_of(claim) for claim in verification.claims.CLAIMS}
+    assert stages_of_claims == set(topics.CLAIM_STAGES) <= set(topics.plans())
+
+
+def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path: Path, monkeypatch: Patch) -> None:
+    monkeypatch.setattr(depends, "BESIDE", tmp_path)
+    found = [depends.depends_of("complementarity")]
+    for text in ("one", "two"):
+        (tmp_path / "problems").mkdir(exist_ok=True)
+        (tmp_path / "problems" / "case.txt").write_text(text)
+        found.append(depends.depends_of("complementarity"))
+    made = [Stage(tmp_path, "a", int, "quick", one) for one in found]
+    made += [Stage(tmp_path, "a", int, "full"), Stage(tmp_path, "b", int, "quick")]
+    for name in ("evidence_version", "this_machine"):
+        monkeypatch.setattr(stages, name, lambda: "another")
+        made.append(Stage(tmp_path, "a", int, "quick"))
+    assert len({stage.path for stage in made}) == len(made)
+    monkeypatch.setattr(keys, "scene_folder", lambda: tmp_path)
+    versions = [keys.evidence_version.__wrapped__()]
+    (tmp_path / "peg.yaml").write_text("name: peg")
+    assert keys.evidence_version.__wrapped__() not in versions
+
+
+def test_another_blas_kernel_or_numpy_code_is_another_machine_and_other_threads_are_not() -> None:
+    """Asked of the libraries themselves, as a user would choose other code."""
+    if "openblas" not in linear_algebra() or dispatched() in (UNKNOWN, "baseline"):
+        pytest.skip("numpy has another BLAS than OpenBLAS, or no optional code for this processor")
+    said = []
+    for chosen in ({"OPENBLAS_CORETYPE": "Prescott"}, {"OPENBLAS_CORETYPE": "Haswell"},
+                   {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"},
+                   {"NPY_DISABLE_CPU_FEATURES": dispatched()}):  # fmt: skip
+        program = "from reports.provenance import this_machine; print(this_machine())"
+        done = subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[2], text=True, check=True,
+                              capture_output=True, env={**os.environ, **chosen})  # fmt: skip
+        said.append(done.stdout.strip())
+    assert said[0] != said[1] == said[2] and "numpy baseline" in said[3]
+
+
+def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path: Path) -> None:
+    def interrupted(failures: list[Failure]) -> Finding:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        filled(tmp_path, interrupted)
+    wrong = filled(tmp_path, lambda _: {"id": 3})  # what is computed must be what is read
+    assert wrong.records is None and wrong.failures[0].error == "ValidationError"
+    assert not list(tmp_path.rglob("tables/*.h5"))
+    path = filled(tmp_path, lambda _: FINDING).path
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(bytes(content))
+    damaged = filled(tmp_path, lambda _: FINDING)
+    assert damaged.records is None and damaged.failures[0].error == "RunFileError"
+
+
+def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until_then(tmp_path: Path) -> None:
+    def compute(failures: list[Failure]) -> tuple[str, ...]:
+        calls.append(1)
+        if len(calls) == 1:
+            failures.append(failure_of("two", ValueError("planted")))
+        return ("one", "two")[: len(calls)]
+
+    calls: list[int] = []
+    for expected in (("one",), ("one", "two"), ("one", "two")):
+        stage = filled(tmp_path, compute, tuple[str, ...])
+        failed = gather.failed_cases(tmp_path / "tables", {stage.name: stage.failures})
+        assert stage.records == expected and stage.path.is_file() and len(failed) == (len(expected) == 1)
+        assert not failed or "planted" in Path(failed[0].file).read_text()
+    assert len(calls) == 2 and not list(tmp_path.rglob("*incomplete*")) and not list(tmp_path.rglob("*failed*"))
+
+
+def test_a_stage_computed_in_a_process_is_that_of_this_process_and_tells_its_progress(
+    tmp_path: Path, monkeypatch: Patch
+) -> None:
+    name, said = "counterexamples", []
+    plan = topics.plans()[name]
+    monkeypatch.setattr(gather, "plans", lambda: {name: plan})
+    monkeypatch.setattr(gather, "_figure_runs", os.path.exists)  # which simulates nothing
+    made = {name: Stage(tmp_path / "tables", name, plan.kind, "quick")}
+    gather._compute_beside(made, tmp_path, "quick", lambda *given: said.append(given))
+    assert repr(made[name].records) == repr(plan.compute(Runner(tmp_path / "runs"), "quick", nothing, []))
+    assert said[0] == (name, 0, 3) and said[-1] == (name, 1, 1)
+
+
+def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path: Path, monkeypatch: Patch) -> None:
+    raised: list[type[BaseException]] = [RuntimeError, KeyboardInterrupt]
+
+    def compute(*_: object) -> Finding:
+        raise raised.pop(0)("the disk went away\nand more")
+
+    monkeypatch.setattr(gather, "plans", lambda: {"engines": Plan(Finding, compute)})
+    stage, again = (Stage(tmp_path / "tables", "engines", Finding, "quick") for _ in range(2))
+    topic = gather._failed(gather._fill(stage, Runner(tmp_path / "runs"), "quick", nothing))
+    assert topic.key == "engines" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
+    first = joined(Evidence(topics=(topic,)), ()).split('<section id="verdict"')[1].split("</section>")[0]
+    assert "Not computed, after RuntimeError: the disk went away." in first and "and more" not in first
+    with pytest.raises(KeyboardInterrupt):
+        gather._fill(again, Runner(tmp_path / "runs"), "quick", nothing)
+
+
+def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[..., Any]:
+    """`original`, which raises where `here` is true of its arguments."""
+
+    @wraps(original)
+    def call(*arguments: Any, **options: Any) -> Any:
+        if here(*arguments):
+            raise ZeroDivisionError("planted")
+        return original(*arguments, **options)
+
+    return call
+
+
+def of_claims(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+    """One trial of C07, and all of C01."""
+    chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
+    chosen["C01"] = replace(chosen["C01"], cases=broken(chosen["C01"].cases, lambda study: True))
+    patch.setattr(verification.claims, "CLAIMS", chosen)
+    patch.setattr(arm, "strike", broken(arm.strike, lambda robot, place, angle, e: (place, angle) ==
+                                                (arm.PLACES[0], arm.ANGLES[0])))  # fmt: skip
+    first, second = topics.checked_claims("claims", Runner(folder), "quick", nothing, failures)
+    assert (first.verdict, first.tables["C01"].rows) == (NOT_COMPUTED, ())
+    assert len(second.tables["C07"].rows) == 2 * len(arm.PLACES) * len(arm.ANGLES) - 3
+
+
+def of_hard_cases(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+    chosen = {name: judge.HARD_CASES[name] for name in ("grazing", "one_contact")}
+    chosen["lost"] = broken(chosen["grazing"], lambda: True)
+    patch.setattr(judge, "HARD_CASES", chosen)
+    patch.setattr(hard_cases, "HARD_CASES", chosen)
+    patch.setattr(judge, "judge_hard_case", broken(judge.judge_hard_case, lambda case, method, _: (
+        method, case.name) == ("svd", chosen["grazing"]().name)))  # fmt: skip
+    found = hard_cases.hard_cases(Runner(folder), nothing, failures)
+    assert [("svd" in [part.name for part in case.parts], case.key) for case in found] == [
+        (False, "grazing"), (True, "one_contact")]  # fmt: skip
+    assert hard_cases.on_hard_cases(found, failures).verdict == NOT_COMPUTED
+
+
+def of_accuracy(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+    patch.setattr(impacts, "TIMED_HARDNESS", impacts.TIMED_HARDNESS[:1])
+    patch.setattr(impacts, "_ENOUGH", 0.0)
+    first, *others = ways = [way for way in impacts.WAYS if way.rows < 3]
+    ways[0] = replace(first, make=broken(first.make, lambda problem: True))
+    table = impacts.work_precision([(4, 3)], ways=ways, progress=nothing, failures=failures)
+    assert table.column("work") == [way.work for way in others]
+    failures[0] = replace(failures[0], case=failures[0].case.removeprefix(table.column("problem")[0]))
+
+
+def of_effects(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+    patch.setattr(effects, "scene_names", lambda: ("peg_corner", "arm_pushing"))
+    patch.setattr(effects, "load_scene", broken(effects.load_scene, lambda path: path.stem == "arm_pushing"))
+    impulses = effects.LEFT_OUT["impulses"]
+    patch.setattr(effects, "_loop", broken(effects._loop, lambda scene, world, variant: variant is impulses))
+    found = effects.effects_of_scenes(nothing, failures)
+    changes = {row["effect"]: row["change"] for row in found["peg_corner"].records() if row["active"]}
+    assert list(found) == ["peg_corner"] and changes.pop("impulses") is None and None not in changes.values()
+
+
+def of_runs(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+    patch.setattr(runs, "FIGURE_RUNS", {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "hole/IAPB")})
+    patch.setattr(runs, "shipped_scene", broken(runs.shipped_scene, lambda name, values: name == "peg_hole"))
+    assert list(runs.figure_runs(Runner(folder), nothing, failures)) == ["corner/IAPB"]
+
+
+STAGES = {
+    of_claims: ["C01", "C07, slender rods, 0.0, 0.1", "C07, point masses at the tips, 0.0, 0.1"],
+    of_hard_cases: ["grazing, svd", "lost"], of_accuracy: [", IAPB, 1 row"],
+    of_effects: ["peg_corner, impulses", "arm_pushing"], of_runs: ["hole/IAPB"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.__name__)
+def test_a_case_that_raises_costs_its_row_only(stage: Callable[..., None], monkeypatch: Patch, tmp_path: Path) -> None:
+    failures: list[Failure] = []
+    stage(monkeypatch, tmp_path, failures)
+    assert [failure.case for failure in failures] == STAGES[stage]
+
+
+def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch: Patch, tmp_path: Path) -> None:
+    def fails(_inputs: object) -> Figure:
+        raise ValueError("planted")
+
+    def draws(_inputs: object) -> Figure:
+        return Figure("whole", "", "A figure", "caption", (Panel("<svg />", "alt"),))
+
+    path = str(tmp_path / "tables" / "claims-failed.txt")
+    failures = tuple(failure_of(f"C{n:02d}", ValueError("planted\nand more")) for n in range(1, 23))
+    recipes = tuple(Recipe(key, "", key, (), draw, "hero") for key, draw in (("broken", fails), ("whole", draws)))
+    monkeypatch.setattr(reproduce, "RECIPES", recipes)
+    monkeypatch.setattr(reproduce, "gather", lambda *_: Evidence(failed=(FailedCases("claims", failures, path),)))
+    answer = reproduce.make_report(tmp_path, "quick")
+    assert answer.status == 1 and answer.facts["failed"][0] == FailedCases("claims", failures, path)
+    lines = answer.lines[next(k for k, line in enumerate(answer.lines) if "Not computed" in line):]
+    assert lines[:2] == ["\nNot computed: 23 cases. The next call tries again.", "  claims: C01: ValueError: planted"]
+    assert lines[21:24] == ["  claims: and 2 more", f"    tracebacks: {path}", "  figures: broken: ValueError: planted"]
+    assert "in fails" in (tmp_path / "tables" / "figures-failed.txt").read_text(encoding="utf-8")
+    page = (tmp_path / "report" / "claims.html").read_text(encoding="utf-8")
+    assert "Not computed: 22 of claims" in page and "C22: ValueError: planted" in page
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Not computed in this run" in page and 'id="whole"' in page
+    assert not (tmp_path / "tables" / "answer.json").exists()  # the next call tries again
+
+
+def test_an_unchanged_report_keeps_its_answer_and_a_changed_one_does_not(tmp_path: Path) -> None:
+    (tmp_path / "tables").mkdir()
+    for name in ("report.html", "runs.h5"):
+        (tmp_path / name).write_text(name)
+    key = report_key(tmp_path, "quick")
+    assert kept_answer(tmp_path, key) is None and report_key(tmp_path, "full") != key
+    for change in (lambda: (tmp_path / "report.html").write_text("other"), (tmp_path / "runs.h5").unlink,
+                   lambda: (tmp_path / "tables/answer.json").write_text("{")):
+        keep_answer(tmp_path, key, {"page": tmp_path}, ["said"], ["runs.h5"])
+        assert kept_answer(tmp_path, key) == (json.loads(json.dumps({"page": str(tmp_path)})), ["said"])
+        assert kept_answer(tmp_path, "another") is None
+        change()
+        assert kept_answer(tmp_path, key) is None
