@@ -154,8 +154,8 @@ def step_for(wanted: float, step: float, shares: Mapping[int, float | None], ord
 
 
 def contact_energy(run: Run, scene: Scene) -> tuple[Floats, Floats, float]:
-    """Return energies [J]: in the contact springs at each instant (n + 1,), the work of the dampers so far (n,), and the
-    work of all normal forces along the paths on which the touching points separate.
+    """Return energies [J]: in the contact springs at each instant (n + 1,), the work of the dampers so far (n,), and
+    the work of all normal forces along the paths on which the touching points separate.
     """
     contacts = run.contacts
     step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))

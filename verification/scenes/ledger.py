@@ -179,8 +179,8 @@ RESIDUALS = Check(
     key="what the books leave open", question="Does the residual fall with the integrator's order?",
     cases=lambda study: scene_names(), row=_open, says=_of_residuals, digits=3,
     note="Residuals of the energy balance, absolute values of motion, springs and curved gaps added. No order: the "
-    f"residual is rounding, and no shorter step was tried. The step for a residual of {WORTH_NAMING:g} % is the longest one tried "
-    "that reaches it, or is extrapolated with the measured order.",
+    f"residual is rounding, and no shorter step was tried. The step for a residual of {WORTH_NAMING:g} % is the "
+    "longest one tried that reaches it, or is extrapolated with the measured order.",
 )
 BOOKS = Check(
     key="energy ledger", question="Does the stored energy ever exceed the energy at the start plus the work done?",
