@@ -1,13 +1,13 @@
 """Counterexamples to the laws, stored so that they can be checked again.
 
-A trajectory or an impact is stored as a run, an impact also in the FCLIB format. The other cases (a wall felt by the
-hand, limits of a device, two rooms) are stored as a table with the seeds that draw them again.
+A trajectory is stored as its run, all other cases as a record with the seeds that draw them again: an impact also with
+its numbers and the answers of the resolver, and in the FCLIB format.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,11 @@ from reference.one_thread import one_thread
 from reference.worlds import run_world
 from reports.by_name import function_named
 from reports.store import read_run, write_run
-from reports.store.impact import BrokenImpact, read_broken_impact, write_broken_impact
 from reports.store.io import opened
 from reports.store.keys import code_version, hash_of, sources_hash
-from reports.store.tables import TABLE_FORMAT, read_record, write_record
+from reports.store.schema import FORMAT
+from reports.store.tables import read_record, write_record
+from verification.impacts import ImpactCase
 from verification.laws import bounds
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, PARTS, UNEQUAL, Found, Subject, drawn, residuals
@@ -70,23 +71,51 @@ def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) ->
     path = folder / f"{found.part.replace(' ', '_')}-{found.index:09d}-{found.law}.h5"
     if found.run is not None:
         return write_run(path, found.run, replace=True)
-    origin = {"part": found.part, "index": found.index, "request": asdict(request)}  # to draw the case again
-    if found.struck is None:
-        record = {**origin, "law": found.law, "value": found.residual.value, "tolerance": found.residual.tolerance,
-                  "case": found.case}  # fmt: skip
-        return write_record(path, record, found.law, command=recheck_command(Path(path.name), request.resolver))
-    case, subject, law = found.struck.case, request.subject(), (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law]
-    e, fclib = case.given_restitution(), path.with_suffix(".hdf5")
-    if case.contacts and np.min(e) >= 0.0:
-        try:
-            write_fclib(fclib, ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, e,
-                                                         name=path.stem))
-        except IapbError:  # FCLIB cannot express this extreme input; the run has it
-            fclib.unlink(missing_ok=True)
-    return write_broken_impact(path, BrokenImpact(
-        found.struck, ENGINE if found.law in ENGINE_LAWS else request.resolver, found.law, law.statement,
-        found.residual.value, found.residual.tolerance, origin,
-        as_test(case, found.law, subject.bounds, subject.resolver)))  # fmt: skip
+    record = {"law": found.law, "resolver": request.resolver, "value": found.residual.value,
+              "tolerance": found.residual.tolerance, "part": found.part, "index": found.index, "request": request,
+              "case": found.case, "test": ""}  # fmt: skip
+    if (struck := found.struck) is not None:
+        case, subject, law = struck.case, request.subject(), (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law]
+        record |= {"resolver": ENGINE if found.law in ENGINE_LAWS else request.resolver, "statement": law.statement,
+                   "rows": struck.rows, "velocity_after": struck.velocity_after, "complaint": struck.complaint,
+                   "test": as_test(case, found.law, subject.bounds, subject.resolver)}  # fmt: skip
+        e, fclib = case.given_restitution(), path.with_suffix(".hdf5")
+        if case.contacts and np.min(e) >= 0.0:
+            try:
+                write_fclib(fclib, ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, e,
+                                                             name=path.stem))
+            except IapbError:  # FCLIB cannot express this extreme input; the record has it
+                fclib.unlink(missing_ok=True)
+    return write_record(path, record, found.law, command=recheck_command(Path(path.name), request.resolver))
+
+
+def read_counterexample(path: Path) -> dict[str, Any] | None:
+    """Return the record of a counterexample, or None for a run.
+
+    Raises
+    ------
+    RunFileError
+        The file is absent, damaged, or neither a run nor a counterexample.
+    """
+    with opened(path, expected_format=None) as file:
+        if file.attrs.get("format") == FORMAT:
+            return None
+    record = read_record(path)
+    try:
+        request = CampaignRequest(**record["request"])
+        if record["part"] not in PARTS or request.bounds not in BOUNDS:
+            raise ValueError(f"part {record['part']!r}, bounds {request.bounds!r}")
+        case = _impact_of(record["case"]) if record["test"] else record["case"]
+        return record | {"request": request, "index": int(record["index"]), "law": str(record["law"]), "case": case}
+    except (TypeError, KeyError, ValueError) as error:
+        raise RunFileError(f"{path}: is no counterexample: {error}") from error
+
+
+def _impact_of(told: dict[str, Any]) -> ImpactCase:
+    d = len(told["velocity"])
+    shapes = {"mass_matrix": (d, d), "contact_jacobian": (-1, d), "translations": (-1, d), "touching": (-1, d)}
+    return ImpactCase(**told | {name: np.array(value, np.float64).reshape(shapes.get(name, np.shape(value)))
+                                for name, value in told.items() if isinstance(value, list)})  # fmt: skip
 
 
 def recheck_command(path: Path, resolver: str) -> str:
@@ -108,13 +137,8 @@ def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResi
     RunFileError
         The file is absent, damaged, or not a counterexample.
     """
-    with opened(path, expected_format=None) as file:
-        is_record = file.attrs.get("format") == TABLE_FORMAT
-    if is_record:
-        record = read_record(path)
-        yield _judged(path, str(record["law"]), record, None, allow_code)
-    elif broken := read_broken_impact(path):
-        yield _judged(path, broken.law, broken.found, broken.struck.case, allow_code)
+    if record := read_counterexample(path):
+        yield _judged(path, record, allow_code)
     else:  # the laws on the stored arrays, then on the same scene simulated again
         run = read_run(path)
         world, _, rendering = run.world.partition(" ")
@@ -123,18 +147,14 @@ def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResi
             yield from ((f"{how}: {law}", residual) for law, residual in judge_run(judged))
 
 
-def _judged(path: Path, law: str, origin: dict[str, Any], case: Any, allow_code: bool) -> tuple[str, LawResidual]:
-    """Check a stored impact; if `case` is None, first draw the case again from its part, seed and index."""
-    try:
-        request = CampaignRequest(**origin["request"])
-        part, index, own = origin["part"], origin["index"], request.resolver == ENGINE or allow_code
-        if part not in PARTS or request.bounds not in BOUNDS:
-            raise ValueError(f"part {part!r}, bounds {request.bounds!r}")
-    except (TypeError, KeyError, ValueError) as error:
-        raise RunFileError(f"{path}: is no counterexample: {error}") from error
+def _judged(path: Path, record: dict[str, Any], allow_code: bool) -> tuple[str, LawResidual]:
+    """Check a stored impact; draw any other case again from its part, seed and index."""
+    request, part, law = record["request"], record["part"], record["law"]
+    own = request.resolver == ENGINE or allow_code
     subject = (request if own else replace(request, resolver=ENGINE)).subject()
     with one_thread():  # as it was found
-        found = residuals(part, drawn(part, index, subject) if case is None else case, subject)[0]
+        case = record["case"] if record["test"] else drawn(part, record["index"], subject)
+        found = residuals(part, case, subject)[0]
     if law not in found:
         raise RunFileError(f"{path}: is no counterexample: no law {law!r} of {part}")
     if own or part not in (IMPACTS, UNEQUAL):

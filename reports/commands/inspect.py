@@ -1,18 +1,17 @@
-"""`iapb inspect FILE`: describe a run file (a simulation, or an impact that broke a law) from its contents alone."""
+"""`iapb inspect FILE`: describe a run file, or a counterexample to a law, from its contents alone."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from reports.commands.run import describe, run_as_json
-from reports.counterexamples import recheck_command
+from reports.counterexamples import read_counterexample, recheck_command
 from reports.show import Answer, Json
-from reports.store.impact import BrokenImpact, read_broken_impact
 from reports.store.runs import read_provenance, read_stored
 from verification.table import Table, titled
 
@@ -27,17 +26,15 @@ def inspect(
     json_: Json = False,
 ) -> Answer:
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
+    if broken := read_counterexample(file):
+        return Answer(broken, list(_broken_law(broken, file)))
     run, entry = read_stored(file)
-    broken, provenance, table = read_broken_impact(file), read_provenance(file), run.impacts
+    provenance, table = read_provenance(file), run.impacts
     listed = [{"time": run.time[step]} | {name: getattr(table, name)[i] for name in _IMPACT}
               for i, step in enumerate(table.step[:impacts])]
     energy = {name: values[-1] for name, values in run.energy.items()} if run.steps else {}
-    lines: list[str | Table]
-    if broken is None:
-        lines = [*describe(run, existed=True), "Complete." if run.complete
-                 else f"Partial: {run.stopped or 'interrupted'}."]
-    else:
-        lines = [*_impact_lines(broken, file)]
+    lines: list[str | Table] = [*describe(run, existed=True),
+                                "Complete." if run.complete else f"Partial: {run.stopped or 'interrupted'}."]
     if listed:
         rows = [tuple(one.values()) for one in listed]
         lines += [f"The first {len(rows)} of {len(table.step)} impacts",
@@ -52,24 +49,24 @@ def inspect(
     lines.append(f"\nrun key      {entry.run_key}\ncontent hash {entry.content_hash}")
     return Answer(run_as_json(run) | {
         "impacts": listed, "energy": energy, "effects": run.effects, "provenance": provenance,
-        "run_key": entry.run_key, "content_hash": entry.content_hash,
-        "broken law": broken and {"law": broken.law, "resolver": broken.resolver, "statement": broken.statement,
-                                  "residual": broken.value, "allowed": broken.tolerance, "test": broken.test}}, lines)
+        "run_key": entry.run_key, "content_hash": entry.content_hash}, lines)
 
 
-def _impact_lines(broken: BrokenImpact, file: Path) -> Iterator[str]:
-    """Yield which law was broken, by which resolver, how it was found, and a test to paste."""
-    case, origin = broken.struck.case, broken.found
-    yield f"An impact of {broken.resolver} that breaks a law, {broken.law}: {broken.statement}."
-    yield f"Residual {broken.value:.6g}, allowed {broken.tolerance:.6g}."
-    if broken.struck.complaint:
-        yield f"The resolver: {broken.struck.complaint}."
+def _broken_law(broken: dict[str, Any], file: Path) -> Iterator[str]:
+    """Yield which law was broken, by which resolver, how it was found, and for an impact a test to paste."""
+    request, case = broken["request"], broken["case"]
+    yield f"{broken['resolver']} breaks a law, {broken['law']}{': ' + broken['statement'] if broken['test'] else ''}."
+    yield f"Residual {broken['value']:.6g}, allowed {broken['tolerance']:.6g}."
+    yield (f"Found as case {broken['index']} of the part {broken['part']!r}, seed {request.seed}. "
+           f"Judged again by: {recheck_command(file, request.resolver)}")
+    if not broken["test"]:
+        return
+    if broken["complaint"]:
+        yield f"The resolver: {broken['complaint']}."
     yield f"{case.contacts} rows on {case.coordinates} coordinates ({case.family or 'no family'}), in bare numbers."
-    yield (f"Found as case {origin['index']} of the part {origin['part']!r}, seed {origin['request']['seed']}. "
-           f"Judged again by: {recheck_command(file, origin['request']['resolver'])}")
     given = {"mass matrix M": case.mass_matrix, "contact Jacobian J": case.contact_jacobian,
              "velocity before": case.velocity, "restitution": case.given_restitution(),
-             "velocity after": broken.struck.velocity_after}  # fmt: skip
+             "velocity after": broken["velocity_after"]}  # fmt: skip
     for name, values in given.items():
         yield f"\n{name}:\n{np.array2string(np.asarray(values), precision=6, prefix='  ', max_line_width=110)}"
-    yield f"\nAs a test, every digit:\n\n{broken.test}\n"
+    yield f"\nAs a test, every digit:\n\n{broken['test']}\n"

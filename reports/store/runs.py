@@ -53,7 +53,6 @@ class RunEntry(NamedTuple):
 
 def write_run(
     path: Path | str, run: Run, *, key: str = "", provenance: Mapping[str, str] | None = None, replace: bool = False,
-    more: Callable[[Any], None] | None = None,
 ) -> Path:
     """Write one run to a temporary file, sync it, and move it to `path` atomically.
 
@@ -67,16 +66,14 @@ def write_run(
         Texts by name; `collect_provenance()` by default.
     replace
         Whether a file at `path` is replaced. Otherwise an existing file is not changed.
-    more
-        Writes additional groups into the open file; readers of the run ignore them.
     """
-    store_run(path, run, key=key, provenance=provenance, replace=replace, more=more)
+    store_run(path, run, key=key, provenance=provenance, replace=replace)
     return Path(path)
 
 
 def store_run(
     path: Path | str, run: Run | Iterator[Run], *, key: str, code: str = "", stopped: str = "", replace: bool = False,
-    provenance: Mapping[str, str] | None = None, more: Callable[[Any], None] | None = None,
+    provenance: Mapping[str, str] | None = None,
 ) -> RunEntry:
     """Write one run like `write_run`, with the label of its code; return the entry of the new file.
 
@@ -99,8 +96,6 @@ def store_run(
             file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
                                "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
             file.attrs["content_hash"] = content_hash(_run_in(file, path, dataset_of))
-        if more is not None:
-            more(file)
         return _entry(file, path)
 
 

@@ -7,7 +7,6 @@
     /impacts                  one row per step and island of a colliding group
     /energy                   the energy balance, at instants and over steps
     /effects                  the active effects, and the reasons
-    /struck                   only if an impact given by numbers broke a law: see reports.store.impact
     /timings, /provenance     outside of the content hash, because they depend on the machine
 
 Each group has its own dimension scales, so that it opens as one xarray dataset.

@@ -13,7 +13,7 @@ from iapb.errors import RunFileError
 from reports.campaign import Campaign
 from reports.cli import main
 from reports.counterexamples import CampaignRequest, keep_counterexample, recheck
-from reports.store.impact import read_broken_impact, write_broken_impact
+from reports.store.tables import read_record, write_record
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
 from verification.laws.planted import doubled_impulse
@@ -71,17 +71,17 @@ def test_a_file_that_names_a_module_does_not_run_it(
     """The attack: a counterexample that names a module of the working directory, which leaves a trace if imported."""
     campaign = Campaign(tmp_path / "out", BROKEN)
     campaign.run(BATCHES[:1], _silent)
-    broken = next(found for path in campaign.counterexamples() if (found := read_broken_impact(path)) is not None)
-    broken.found["request"]["resolver"] = "trap_of_theirs:resolver"
+    broken = read_record(campaign.counterexamples()[0])
+    broken["request"]["resolver"] = "trap_of_theirs:resolver"
     (tmp_path / "trap_of_theirs.py").write_text("from pathlib import Path\nPath('trace').touch()\nresolver = print\n")
     monkeypatch.chdir(tmp_path)
-    write_broken_impact(Path("evil.h5"), broken)
+    write_record(Path("evil.h5"), broken, "evil")
     assert main(["verify", "--recheck", "evil.h5"]) == 0  # the engine keeps the law
     said = capsys.readouterr().out
     assert "by iapb:resolve_impact; trap_of_theirs:resolver, which the file names" in said
     assert not Path("trace").exists() and "trap_of_theirs" not in sys.modules
-    broken.found["request"]["bounds"] = "__loader__"
-    write_broken_impact(Path("evil.h5"), broken)
+    broken["request"]["bounds"] = "__loader__"
+    write_record(Path("evil.h5"), broken, "evil")
     with pytest.raises(RunFileError, match="is no counterexample"):
         list(recheck(Path("evil.h5")))
 

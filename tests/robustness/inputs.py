@@ -49,6 +49,7 @@ from tests.robustness.damage import TOKENS, Rng, changes, chosen, damaged_bytes,
 from tests.robustness.faults import put
 from verification.table import titled
 
+TIMES = int(os.environ.get("IAPB_FUZZ", "1"))  # how often each fault is done, and a multiple of the wrong inputs
 _STEPS = 3  # of a scene that is read all the same: it must also start
 
 
@@ -59,14 +60,14 @@ class Kind:
     samples : valid inputs, as bytes, by file name
     damaged : (sample, another sample, rng) -> wrong input
     read : reads a file; ends without a word, or raises an IapbError
-    share : of the cases, beside the other kinds: less where a case takes long
+    cases : how many are tried: fewer where a case takes long
     """
 
     name: str
     samples: Callable[[], dict[str, bytes]]
     damaged: Callable[[bytes, bytes, Rng], bytes]
     read: Callable[[Path], Any]
-    share: float = 1.0
+    cases: int = 200
 
 
 def prepare(folder: Path) -> None:
@@ -367,13 +368,13 @@ def run_line(path: Path) -> None:
     if status:
         raise IapbError(complained)
 KINDS = {kind.name: kind for kind in (
-    Kind("scenes", _shipped("*.yaml"), _as_values, _read_scene, 2.0),
-    Kind("URDF robots", _shipped("robots/*.urdf"), _as_text, _read_robot, 1.5),
-    Kind("sweep studies", _shipped("sweeps/*.yaml"), _as_values, _read_study, 1.5),
-    Kind("LCP and MLCP files", problem_texts, _as_text, read_problem, 1.25),
+    Kind("scenes", _shipped("*.yaml"), _as_values, _read_scene, 300),
+    Kind("URDF robots", _shipped("robots/*.urdf"), _as_text, _read_robot),
+    Kind("sweep studies", _shipped("sweeps/*.yaml"), _as_values, _read_study),
+    Kind("LCP and MLCP files", problem_texts, _as_text, read_problem),
     Kind("FCLIB files", fclib_files, damaged_hdf5, read_problem),
-    Kind("run files and tables", result_files, _as_bytes, _read_results, 1.25),
-    Kind("sealed run files", result_files, damaged_hdf5_sealed, _read_results, 0.6),
-    Kind("parts of killed runs", lambda: _killed()[0], damaged_parts, _read_parts, 0.4),
-    Kind("command lines", lines, damaged_line, run_line, 0.5),
+    Kind("run files and tables", result_files, _as_bytes, _read_results),
+    Kind("sealed run files", result_files, damaged_hdf5_sealed, _read_results, 60),
+    Kind("parts of killed runs", lambda: _killed()[0], damaged_parts, _read_parts, 60),
+    Kind("command lines", lines, damaged_line, run_line, 60),
 )}  # fmt: skip

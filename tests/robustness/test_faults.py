@@ -5,23 +5,27 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tests.robustness.faults as faults
-from tests.robustness.faults import FAULTS, do_fault, open_store
-from tests.robustness.kills import FOREIGN, foreign_hash, killed_command, make_foreign
+from iapb.errors import RunFileError
+from tests.robustness.faults import FAULTS, killed_writer, open_store
+from tests.robustness.inputs import TIMES
+from tests.robustness.kills import COMMANDS, FOREIGN, foreign_hash, killed_command, make_foreign
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_nothing_finished_is_lost(tmp_path: Path, name: str) -> None:
-    tried, survived, lost, said = do_fault(name, tmp_path, 2)
-    assert (survived, lost) == (tried, 0) and said
+    rng = np.random.default_rng(0)
+    for attempt in range(2 * TIMES):
+        (tmp_path / str(attempt)).mkdir()
+        FAULTS[name](tmp_path / str(attempt), rng)
 
 
-@pytest.mark.parametrize("name", ["run", "sweep", "store gc"])
+@pytest.mark.parametrize("name", COMMANDS if TIMES > 1 else ["run", "sweep", "store gc"])
 def test_a_killed_command_loses_nothing_and_touches_nothing_foreign(tmp_path: Path, name: str) -> None:
-    tried, survived, lost, _ = killed_command(name, tmp_path, 1)
-    assert (tried, survived, lost) == (1, 1, 0)
+    killed_command(name, tmp_path, -(-TIMES // 4))
 
 
 def test_a_change_of_a_foreign_file_and_a_writer_in_place_would_be_seen(
@@ -42,4 +46,7 @@ def test_a_change_of_a_foreign_file_and_a_writer_in_place_would_be_seen(
                 time.sleep(1e-3)
 
     monkeypatch.setattr(faults, "write_for_ever", careless)
-    assert do_fault("kill -9 at a random moment", tmp_path / "careless", 3)[1] < 3
+    with pytest.raises((AssertionError, RunFileError)):
+        for attempt in range(3):
+            (tmp_path / str(attempt)).mkdir()
+            killed_writer(tmp_path / str(attempt), np.random.default_rng(attempt))
