@@ -8,7 +8,7 @@ import typer
 
 from reports.show import Answer, Json
 from verification.proofs import all_proofs, check
-from verification.proofs.coq_development import NO_ANSWER, says, statements, theorems
+from verification.proofs.coq_development import NO_ANSWER, statements, theorems
 
 
 def prove(
@@ -34,7 +34,7 @@ def prove(
     for theorem in (*about_code, *in_coq):
         verdict = {True: "accepted", False: "refused", None: theorem.coq}[theorem.holds]
         plain = {"name": theorem.name, "verdict": verdict, "axioms": theorem.axioms, "error": theorem.error}
-        about = {"says": says(theorem.name)} if theorem in about_code else {}
+        about = {"says": theorem.says} if theorem in about_code else {}
         facts["theorems" if about else "coq"].append(plain | about)
         lines.append(f"Coq: {verdict:<8} {theorem.name:<36} {''.join(f'{said}; ' for said in about.values())}axioms: "
                      f"{theorem.error or ', '.join(theorem.axioms) or '-'}")

@@ -26,7 +26,7 @@ from verification.finding import (
     of_each,
 )
 from verification.proofs import layout
-from verification.proofs.coq_development import ARGUED, NO_ANSWER, Theorem, says, statements
+from verification.proofs.coq_development import ARGUED, NO_ANSWER, Theorem, statements
 from verification.proofs.prove import checked
 from verification.proofs.show import NO, NOT_APPLICABLE, YES, ProofRecord
 from verification.table import titled
@@ -50,13 +50,9 @@ def check(name: str) -> ProofRecord:
 
 def check_all(progress: Callable[[int, int], None], failures: list[Failure]) -> tuple[ProofRecord, ...]:
     """Check all statements; a statement that raises an exception gives a Failure and no record."""
-    return tuple(of_each(counted(all_proofs(), progress), lambda name: [_check_with_coq(name)], failures))
-
-
-def _check_with_coq(name: str) -> ProofRecord:
-    """Return the record, with Coq's answer for the statements of `Theorems.v`."""
-    record, theorem = check(name), statements().get(name)
-    return replace(record, coq=theorem.coq) if theorem else record
+    found = of_each(counted(all_proofs(), progress), lambda name: [check(name)], failures)
+    in_coq = {name: theorem.coq for name, theorem in statements().items()}
+    return tuple(replace(record, coq=in_coq.get(record.name, record.coq)) for record in found)
 
 
 def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
@@ -74,7 +70,7 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
     if development:
         tables["theorems about the code"] = titled(
             ("theorem", "says", "holds", "own kernel", "SymPy", "Coq", "assumes"),
-            [(one.name, says(one.name), one.holds, NOT_APPLICABLE, NOT_APPLICABLE, one.coq, ", ".join(one.axioms))
+            [(one.name, one.says, one.holds, NOT_APPLICABLE, NOT_APPLICABLE, one.coq, ", ".join(one.axioms))
              for one in development])  # fmt: skip
         asked = [one for one in development if one.holds is not None]
         lost = [one for one in development if one.coq == NO_ANSWER]

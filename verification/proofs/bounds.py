@@ -29,8 +29,6 @@ from iapb.errors import ArgumentError
 UNIT_ROUNDOFF = 2.0**-53
 _MARGIN = 65.0 / 64.0  # covers products of terms that are each below 2⁻¹²
 _SMALL = 2.0**-12
-# In the pivoted factorisation every eligible residual is nearly orthogonal to the basis before its last pass.
-REORTHOGONALISED_OVERLAP = 2.0**-10
 
 
 def gain_bound(d: int, kappa: float) -> float:
@@ -110,34 +108,3 @@ def projector_bound(d: int, departure: float) -> float:
     rounding = 2.0 * (gamma(d) + gamma(d + 2) + UNIT_ROUNDOFF) * math.sqrt(d) * (1.0 + departure)
     exact = 4.0 * departure * (1.0 + departure)
     return exact + 2.0 * math.sqrt(1.0 + exact) * rounding + rounding * rounding
-
-
-def orthogonality_bound(d: int) -> float:
-    """Return a bound of ‖QᵀQ − I‖ for re-orthogonalised Gram-Schmidt (Kahan's criterion: the last pass keeps half).
-
-    If the last pass starts from a unit vector with overlap ω ≤ 2⁻¹⁰ and keeps at least half of its length, then
-    |Qₖᵀq| ≤ 2(ω δ + 3γ_d √d); over d columns δ ≤ √2 d · 6γ_d √d / (1 − 4dω) + (d + 4) u.
-    """
-    columns = 6.0 * math.sqrt(2.0) * d * gamma(d) * math.sqrt(d)
-    return columns / max(0.25, 1.0 - 4.0 * d * REORTHOGONALISED_OVERLAP) + (d + 4) * UNIT_ROUNDOFF
-
-
-def cholesky_error(d: int, kappa: float) -> float:
-    """Return η = d γ_{d+1} κ / (1 − d γ_{d+1}), for which |vᵀ(L Lᵀ − M)v| ≤ η vᵀMv (Higham 2002, Theorem 10.3)."""
-    g = gamma(d + 1)
-    return d * g * kappa / (1.0 - d * g)
-
-
-def unclamped_bound(d: int, kappa: float) -> float:
-    """Return the bound of the relative gain of the factored form *without* the final clamp (fp_cholesky).
-
-    The bound is (1+η)/(1−η) (1+g)(1+σ)² − 1, about 2 d² u κ, with Cholesky's backward error η, the projector's g, and
-    σ = 6 γ_{d+1} √(dκ) for Lᵀv, the triangular solve and the rounding of v⁺. It is infinite if η ≥ 1, because L then
-    need not approximate M.
-    """
-    eta = cholesky_error(d, kappa)
-    if eta >= 1.0:
-        return math.inf
-    solves = 6.0 * gamma(d + 1) * math.sqrt(d * kappa * (1.0 + eta) / (1.0 - eta))
-    growth = 1.0 + projector_bound(d, orthogonality_bound(d))
-    return (1.0 + eta) / (1.0 - eta) * growth * (1.0 + solves) ** 2 - 1.0

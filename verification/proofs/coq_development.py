@@ -8,7 +8,6 @@ claims nothing.
 
 from __future__ import annotations
 
-import hashlib
 import re
 import shutil
 import subprocess
@@ -31,25 +30,6 @@ KNOWN_AXIOMS = frozenset({
     "FunctionalExtensionality.functional_extensionality_dep", "Classical_Prop.classic"})  # fmt: skip
 STATEMENTS = "Theorems"  # the file with theorems that are also statements of the kernel, by the same names
 NOT_RUN, NO_ANSWER = "not run here", "no answer"
-# Theorem -> digest of its statement (`stated`) and its description; if the statement changes, that is not printed.
-SAYS = {
-    "check_sound": ("a1c099410aa9a793", "if the exact checker accepts, wᵀMw ≤ vᵀMv over the real numbers"),
-    "check_complete": ("307f807fb7ca5381", "if it rejects lists of the right lengths, wᵀMw > vᵀMv"),
-    "two_sum_exact": ("da0982301a48a8d2", "two_sum(a, b) is a + b exactly, in binary64 with gradual underflow"),
-    "two_product_exact": ("ab85118807940730",
-        "two_product(a, b) is exactly a b if a b is 0 or its magnitude is at least 2⁻⁹⁶⁹"),
-    "two_product_underflow": ("4fa5b793024e5317", "two_product(a, b) always differs from a b by at most 7/2 · 2⁻¹⁰⁷⁴"),
-    "compensated": ("537f5e2556a42bd2", "error bound of a double-double sum of n terms, by induction on n"),
-    "loop_error": ("330c43387117ff63",
-        "error and size of either loop of `gain`, a double-double sum of n products of pairs"),
-    "gain_error": ("3e9e8314039b9603",
-        "error of `gain`: |Γ − (high + low)| is at most the sum of the bounds of its rows and of their sum"),
-    "entry_fits": ("952bdee92e943e09",
-        "the terms that the code adds, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), are exact and meet the hypotheses of gain_error"),
-    "sign_kept": ("d893e705bea3b779", "if a computed sum is at most 0, the exact sum is at most 0"),
-    "accepted_never_gains": ("ae6f139f59ee5a76",
-        "if the computed high + (low + radius) ≤ 0 and the radius bounds the error, then Γ ≤ 0"),
-}  # fmt: skip
 # Text for the report beside the theorems: the rest of the proof that an accepted candidate never gains energy.
 ARGUED = ("Not proved in Coq: the error bound of theorem gain_error is below the radius that the function `gain` "
           "returns (rational arithmetic shows this for each d; the rounding of the radius has an argument in prose). "
@@ -59,13 +39,14 @@ _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 @dataclass(frozen=True)
 class Theorem:
-    """A theorem of the development: Coq's answer (yes, not run here, no answer), the axioms that it uses, and the error
-    if Coq did not compile its file."""
+    """A theorem of the development: Coq's answer (yes, not run here, no answer), the axioms that it uses, the error if
+    Coq did not compile its file, and what it says, in the English of the comment beside it."""
 
     name: str
     coq: str
     axioms: tuple[str, ...] = ()
     error: str = ""
+    says: str = ""
 
     @property
     def holds(self) -> bool | None:
@@ -88,32 +69,12 @@ def statements() -> dict[str, Theorem]:
 
 def _answered(name: str) -> tuple[Theorem, ...]:
     if lacking(name):
-        return tuple(Theorem(one, NOT_RUN) for one in _asked(name))
+        return tuple(Theorem(one, NOT_RUN, says=said) for one, said in _asked(name).items())
     with TemporaryDirectory() as folder:
         try:
             return compiled(name, Path(folder))
         except IapbError as error:  # may be due to another version of Coq or Flocq, so it refutes nothing
-            return tuple(Theorem(one, NO_ANSWER, (), str(error)) for one in _asked(name))
-
-
-def says(name: str) -> str:
-    """Return the English description of a theorem, or its Coq statement if that or an earlier definition changed."""
-    digest, statement = stated(name)
-    described, english = SAYS.get(name, ("", ""))
-    return english if described == digest else f"changed since it was described: {statement}"
-
-
-def stated(name: str) -> tuple[str, str]:
-    """Return a digest of a theorem's statement and all definitions before it, without proofs, and the statement."""
-    for path in sorted(FOLDER.glob("*.v")):
-        source = re.sub(r"\(\*.*?\*\)|\bProof\..*?\bQed\.", " ", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-        before: list[str] = []
-        for sentence in (" ".join(one.split()) for one in re.split(r"\.\s", source)):
-            if re.match(rf"Theorem {re.escape(name)}\b", sentence):
-                return hashlib.sha256("\n".join([*before, sentence]).encode()).hexdigest()[:16], sentence
-            if not sentence.startswith(("Lemma ", "Theorem ", "Print ")):
-                before.append(sentence)
-    return "", "no such theorem"
+            return tuple(Theorem(one, NO_ANSWER, (), str(error), said) for one, said in _asked(name).items())
 
 
 def version() -> str:
@@ -147,16 +108,17 @@ def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
     asked, answers = _asked(name), _assumptions(said)
     if not asked or len(asked) != len(answers):
         raise IapbError(f"{name}.v asks for the assumptions of {len(asked)} theorems; Coq answers {len(answers)}")
-    return tuple(Theorem(one, YES, axioms) for one, axioms in zip(asked, answers, strict=True))
+    return tuple(Theorem(one, YES, axioms, says=asked[one]) for one, axioms in zip(asked, answers, strict=True))
 
 
 def _source(name: str) -> str:
     return (FOLDER / f"{name}.v").read_text(encoding="utf-8")
 
 
-def _asked(name: str) -> list[str]:
-    """Return the names of the theorems whose assumptions a file prints."""
-    return re.findall(r"^Print Assumptions (\w+)", _source(name), re.MULTILINE)
+def _asked(name: str) -> dict[str, str]:
+    """Return the theorems whose assumptions a file prints, each with its description in English."""
+    found = re.findall(r"^Print Assumptions (\w+)\.(?: \(\* ([^*]+) \*\))?", _source(name), re.MULTILINE)
+    return {theorem: " ".join(english.split()) for theorem, english in found}
 
 
 def _run(command: list[str], folder: Path | None = None) -> str:

@@ -144,8 +144,8 @@ Proof.
   congruence.
 Qed.
 
-Print Assumptions check_sound.
-Print Assumptions check_complete.
+Print Assumptions check_sound. (* if the exact checker accepts, wᵀMw ≤ vᵀMv over the real numbers *)
+Print Assumptions check_complete. (* if it rejects lists of the right lengths, wᵀMw > vᵀMv *)
 
 (* Lists, pairs and booleans become OCaml's; integers stay the ones proved about. *)
 Extraction "judge.ml" check.

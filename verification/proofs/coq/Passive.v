@@ -94,9 +94,11 @@ Theorem two_product_underflow a b : number a -> number b ->
   Rabs (a * b - (fst (two_product a b) + snd (two_product a b))) <= 7 / 2 * eta.
 Proof. intros Fa Fb. apply (dekker a b Fa Fb). Qed.
 
-Print Assumptions two_sum_exact.
-Print Assumptions two_product_exact.
-Print Assumptions two_product_underflow.
+Print Assumptions two_sum_exact. (* two_sum(a, b) is a + b exactly, in binary64 with gradual underflow *)
+Print Assumptions two_product_exact. (* two_product(a, b) is exactly a b if a b is 0 or its magnitude is at
+   least 2⁻⁹⁶⁹ *)
+Print Assumptions two_product_underflow. (* two_product(a, b) always differs from a b by at most 7/2 · 2⁻¹⁰⁷⁴
+   *)
 
 Lemma add_near x y : number x -> number y -> Rabs (x + y - add x y) <= u * Rabs (x + y).
 Proof.
@@ -303,7 +305,7 @@ Proof.
     + apply Rle_trans with (1 := Hl). apply Rmult_le_compat_r; lra.
 Qed.
 
-Print Assumptions compensated.
+Print Assumptions compensated. (* error bound of a double-double sum of n terms, by induction on n *)
 
 (* The terms of both loops: x = hi + lo from two_sum, |lo| <= u |hi|; y = hi + lo with |hi| <= m, |lo| <= q m + z. In a row
    y is a pair from two_sum as well (m = |hi|, q = u, z = 0); over the rows y is the sum of a row. *)
@@ -493,9 +495,11 @@ Proof.
   pose proof (Rle_abs (gamma - (high + low))). pose proof (Rle_abs (low + radius - add low radius)). lra.
 Qed.
 
-Print Assumptions loop_error.
-Print Assumptions sign_kept.
-Print Assumptions accepted_never_gains.
+Print Assumptions loop_error. (* error and size of either loop of `gain`, a double-double sum of n products of
+   pairs *)
+Print Assumptions sign_kept. (* if a computed sum is at most 0, the exact sum is at most 0 *)
+Print Assumptions accepted_never_gains. (* if the computed high + (low + radius) ≤ 0 and the radius bounds the
+   error, then Γ ≤ 0 *)
 
 (* `gain` itself: rows of factors, one for each coordinate, and the double-double d of its change of velocity. *)
 Record row := Row { d_hi : R; d_lo : R; entries : list factors }.
@@ -586,7 +590,8 @@ Proof.
 Qed.
 End Gain.
 
-Print Assumptions gain_error.
+Print Assumptions gain_error. (* error of `gain`: |Γ − (high + low)| is at most the sum of the bounds of its
+   rows and of their sum *)
 
 (* What the code puts in: (M_ij + M_ji) (w_j + v_j) of a row, and w_i - v_i, are exact and meet the hypotheses above. *)
 Definition entry (a b w v : R) :=
@@ -603,4 +608,5 @@ Proof.
     rewrite !two_sum_exact by assumption. reflexivity.
 Qed.
 
-Print Assumptions entry_fits.
+Print Assumptions entry_fits. (* the terms that the code adds, (Mᵢⱼ + Mⱼᵢ)(wⱼ + vⱼ), are exact and meet the
+   hypotheses of gain_error *)
