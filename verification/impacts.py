@@ -104,6 +104,11 @@ class ImpactCase:
         return np.linalg.cholesky(self.mass_matrix)
 
     @cached_property
+    def u(self) -> Floats:
+        """Lᵀv (d,)."""
+        return self.lower.T @ self.velocity
+
+    @cached_property
     def rows(self) -> Floats:
         """A = J L⁻ᵀ (c, d)."""
         return np.linalg.solve(self.lower, self.contact_jacobian.T).T
@@ -154,7 +159,7 @@ class ImpactCase:
     @cached_property
     def speed(self) -> float:
         """Kinetic norm |u| = √(vᵀMv)."""
-        return float(np.linalg.norm(self.lower.T @ self.velocity))
+        return float(np.linalg.norm(self.u))
 
     def distance(self, one: Floats, other: Floats) -> float:
         """Distance between two velocities in the kinetic metric, relative to |u|."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from iapb.contact.kernels.impact import rank_tolerance
 from iapb.errors import ArgumentError
-from verification.impacts import Floats
+from verification.impacts import Floats, ImpactCase
 
 _EPS = float(np.finfo(float).eps)
 
@@ -46,12 +46,10 @@ def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 def svd(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Return v⁺ by (21) with the projector from the truncated singular value decomposition of the unit rows of A."""
-    lower = np.linalg.cholesky(M)
-    rows = np.linalg.solve(lower, J.T).T
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    _, singular, right = np.linalg.svd(rows / np.where(length > 0.0, length, 1.0), full_matrices=False)
-    Q, u = right[singular > rank_tolerance(lower)], lower.T @ v
-    return np.asarray(np.linalg.solve(lower.T, u - (1.0 + e) * Q.T @ (Q @ u)))
+    case = ImpactCase(M, J, v)
+    _, singular, right = np.linalg.svd(case.unit_rows, full_matrices=False)
+    Q = right[singular > rank_tolerance(case.lower)]
+    return np.asarray(np.linalg.solve(case.lower.T, case.u - (1.0 + e) * Q.T @ (Q @ case.u)))
 
 
 # To add a method, add a line here.

@@ -17,16 +17,7 @@ from verification.cost.impacts import ACCURACY, BUDGET_ROWS, ORDER_BIAS
 from verification.cost.robots import MANY, ONE, ROBOTS
 from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL
 from verification.cost.steps import BODIES, IDEAL, PROFILE, RACES, START
-from verification.cost.trajectories import (
-    BELOW,
-    MOTIONS,
-    STIFFENED,
-    TIMED_OUT,
-    WORLDS,
-    WORTH,
-    curves,
-    worth,
-)
+from verification.cost.trajectories import BELOW, MOTIONS, STIFFENED, TIMED_OUT, WORLDS, WORTH, curves, worth
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Failure, Finding
 from verification.haptic_rate import BENCH, KERNELS, RATE, SOLVERS, TOPIC, quoting
 from verification.table import Table, table_from

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb import resolve_impact
-from iapb.run import Run
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
 from reference.exact import bulk_energy_gain, exact_impact, rational_matrix
@@ -22,7 +21,7 @@ from verification.claims.peg import place, trace
 from verification.impacts import Family, Floats, ImpactCase, approaching, draw_of_rank, whole_numbers
 from verification.methods import gram_cholesky, gram_pinv
 from verification.proofs.cases import pseudo_inverse
-from verification.scenes.measures import COORDINATES, Trace
+from verification.scenes.measures import COORDINATES
 from verification.table import Row, Table
 
 EPSILON = float(np.finfo(np.float64).eps)
@@ -205,12 +204,6 @@ C02 = losses(
 _ROWS = [Family(*size, k) for size in ((3, 4, 2), (3, 6, 3), (6, 12, 4)) for k in (1e1, 1e3, 1e5)]
 
 
-def _row_bound(batch: Batch) -> float:
-    """Return 100 d ε max(κ(M), κ(W)): both methods solve with M and with W, the Delassus matrix of independent rows."""
-    condition = max(batch.family.condition_number, *(np.linalg.cond(_delassus(case)) for case in batch.impacts))
-    return float(100.0 * batch.family.coordinates * EPSILON * condition)
-
-
 def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Measure:
     """Distance |v⁺(all rows) − v⁺(independent rows)| in the kinetic metric, relative to |v⁻|."""
 
@@ -219,7 +212,11 @@ def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Me
         everything, chosen = method(mass, rows, velocity, e), gram_cholesky(mass, rows[:rank], velocity, e)
         return float(np.sqrt(kinetic_energy(mass, everything - chosen) / kinetic_energy(mass, velocity)))
 
-    return Measure(lambda batch: worst(distance(case, batch.restitution) for case in batch.impacts), _row_bound)
+    def bound(batch: Batch) -> float:  # both methods solve with M and with W
+        condition = max(batch.family.condition_number, *(np.linalg.cond(_delassus(case)) for case in batch.impacts))
+        return float(100.0 * batch.family.coordinates * EPSILON * condition)
+
+    return Measure(lambda batch: worst(distance(case, batch.restitution) for case in batch.impacts), bound)
 
 
 def _differing(velocities: Callable[[ImpactCase, Fraction], tuple[Any, Any]]) -> Measure:
@@ -240,11 +237,6 @@ def _by_pseudo_inverse(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
     return [Fraction(str(x)) for x in after.entries()], exact_impact(*case.arrays, e).velocity
 
 
-def _reversed_rows(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
-    mass, rows, velocity = case.arrays
-    return exact_impact(mass, rows[::-1], velocity, e).velocity, exact_impact(mass, rows, velocity, e).velocity
-
-
 C03 = batches(
     "C03", "The pseudo-inverse gives the same state as first removing the redundant rows.",
     place="Section V-B, equations (25) and (33)",
@@ -257,7 +249,9 @@ C03 = batches(
         "pseudo-inverse, in doubles": _rows_apart(gram_pinv),
         "orthonormal basis, in doubles": _rows_apart(lambda *arrays: resolve_impact(*arrays).velocity),
         "pseudo-inverse, in rationals": _differing(_by_pseudo_inverse),
-        "other independent rows, in rationals": _differing(_reversed_rows),
+        "other independent rows, in rationals": _differing(lambda case, e: (
+            exact_impact(case.mass_matrix, case.contact_jacobian[::-1], case.velocity, e).velocity,
+            exact_impact(*case.arrays, e).velocity)),
     },
     says="Number of states that differ in rational arithmetic: {pseudo-inverse, in rationals}; with another choice of "
     "independent rows: {other independent rows, in rationals}. Relative difference in doubles, printed formula: "
@@ -271,11 +265,6 @@ _ELASTIC = [Family(*size, k) for size in ((1, 1, 1), (3, 1, 1), (3, 6, 3), (6, 1
             for k in (1e1, 1e4, 1e8)]  # fmt: skip
 
 
-def _exact_change(batch: Batch) -> float:
-    impacts = [exact_impact(*case.arrays, 1) for case in batch.impacts]
-    return worst(float(abs(impact.energy_after - impact.energy_before)) for impact in impacts)
-
-
 C04 = batches(
     "C04", "With e = 1 kinetic energy is conserved.", place="Sections V-A and V-B",
     quantity="Largest relative change of kinetic energy, gain or loss.",
@@ -283,7 +272,9 @@ C04 = batches(
     "rational arithmetic zero.",
     families=_ELASTIC, restitutions=(1.0,), impacts={"quick": 12, "full": 200}, exact=(_ELASTIC[::3], 1.0),
     parts={"in doubles": Measure(lambda batch: worst(np.abs(energy_gains(batch))), solve_bound),
-           "in rationals": Measure(_exact_change)},
+           "in rationals": Measure(lambda batch: worst(
+               float(abs(impact.energy_after - impact.energy_before))
+               for impact in (exact_impact(*case.arrays, 1) for case in batch.impacts)))},
     says="Relative change of energy in doubles: {in doubles}. Change of energy [J] in rational arithmetic: {in "
     "rationals}.",
 )  # fmt: skip
@@ -317,14 +308,9 @@ C05 = batches(
 
 # C06: other coordinates
 
-MASS_CONDITION = 1e2
-# Condition numbers of the change of coordinates. From metres to millimetres, with radians kept, it is about 1e3.
+MASS_CONDITION = 1e2  # κ(M); the condition number of a family is that of its change of coordinates
+# From metres to millimetres, with radians kept, it is about 1e3.
 _CHANGES = [Family(*size, k) for size in ((3, 1, 1), (3, 6, 3), (6, 12, 4)) for k in (1e0, 1e3)]
-
-
-def _draw_for_changes(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
-    """Draw impacts with κ(M) = MASS_CONDITION; the family's condition number is that of the change of coordinates."""
-    return draw_of_rank(family._replace(condition_number=MASS_CONDITION), count, seed)
 
 
 def _coordinates_apart(batch: Batch) -> float:
@@ -372,7 +358,7 @@ C06 = batches(
             100.0 * batch.family.coordinates * EPSILON * MASS_CONDITION * batch.family.condition_number**2)),
         "shear by whole numbers, in rationals": _differing(_sheared),
     },
-    draw=_draw_for_changes,
+    draw=lambda family, *given: draw_of_rank(family._replace(condition_number=MASS_CONDITION), *given),
     says="Relative difference of the outcomes after transforming back: {random change of coordinates, in doubles}. "
     "Number of outcomes that differ in rational arithmetic: {shear by whole numbers, in rationals}.",
 )  # fmt: skip
@@ -401,12 +387,8 @@ def _random_or_peg(study: Study, case: tuple[Any, ...]) -> Any:
     traces = list(study.each(starts, lambda start: [trace(study, start, "IAPB", rendering)]))
     return {"part": case[0], "coordinates": 3, "restitution": 0.0,
             "impacts": sum(len(one.impact_step) for one in traces),
-            "error": worst(map(_largest_gain, traces)), "bound": 100.0 * EPSILON}  # fmt: skip
-
-
-def _largest_gain(trace: Trace) -> float:
-    """Largest energy gain of an impact of the run, relative to the energy before that impact."""
-    return worst(-trace.energy_lost / trace.kinetic_energy[trace.impact_step])
+            "error": worst(gain for one in traces for gain in -one.energy_lost / one.kinetic_energy[one.impact_step]),
+            "bound": 100.0 * EPSILON}  # fmt: skip
 
 
 C08 = replace(_PASSIVE, row=_random_or_peg,
@@ -431,20 +413,14 @@ def _without_impulse(study: Study, case: Family | Condition) -> Iterator[Row]:
         yield {"part": RESOLVER, "coordinate": "all"} | dict.fromkeys(Condition().row()) | {
             "contacts": case.contacts, "impacts": len(impacts), "error": moved, "bound": 0.0}  # fmt: skip
         return
-    penalty = trace(study, case, "PB")
+    penalty, scene = trace(study, case, "PB"), place(study, case)
     for part, e, bound in ((TRAJECTORY, -1.0, 0.0), (ALMOST, JUST_ABOVE, SAME_TRAJECTORY)):
-        run = _run_with(study, case, e)
+        contact = scene.contact.model_copy(update={"restitution": e})  # scene files may not have a negative e
+        run = run_world(scene.model_copy(update={"contact": contact}), "IAPB", "full")
         apart = np.maximum(np.abs(run.device_q - penalty.device).max(0), np.abs(run.q - penalty.tool).max(0))
         for coordinate, error in zip(COORDINATES, apart, strict=True):
             yield {"part": part, "coordinate": coordinate, **case.row(), "impacts": len(run.impacts.step),
                    "error": float(error), "bound": bound}  # fmt: skip
-
-
-def _run_with(study: Study, start: Condition, restitution: float) -> Run:
-    """Run IAPB with a negative e. Scene files may not have a negative e, so this run is not stored."""
-    scene = place(study, start)
-    contact = scene.contact.model_copy(update={"restitution": restitution})
-    return run_world(scene.model_copy(update={"contact": contact}), "IAPB", "full")
 
 
 def _without_impulse_says(table: Table) -> str:

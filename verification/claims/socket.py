@@ -64,7 +64,6 @@ def _row(study: Study, case: Socket) -> dict[str, Any]:
 
 def _found(study: Study, case: Socket) -> FalseCollisions:
     distances = {"cluster_distance": 1e-3 * case.cluster, "coherence_distance": 1e-3 * case.coherence}
-
     return study.once(("socket", case), lambda: count_false(
         study.run(socket(distances | {"damping": case.damping}, case.rate), "IAPB", "full")))
 
@@ -81,7 +80,7 @@ def _holds(row: Row) -> bool | None:
 def _says(table: Table) -> str:
     clustering = table.where(part=CLUSTERING)
     collisions, unfiltered, doubled, all_contacts = (
-        _middle(clustering.column(f"{kind}{without}"))
+        sorted(clustering.column(f"{kind}{without}"))[len(clustering.rows) // 2] if clustering.rows else "no"
         for kind in ("false collisions", "doubled contacts") for without in ("", " without filters"))
     return (
         "Temporal coherence removes false collisions only if its distance reaches the contact on the next facet, "
@@ -100,10 +99,6 @@ def _bouncing(failures: Table) -> str:
     where = ", ".join(f"{value:g}" for value in sorted(set(failures.column("damping"))))
     return (f". Even then it fails in {len(failures.rows)} trials (contact damping {where} N s/m): in {off} of them "
             "the ball bounces off the facets at the edges, and each return is a new contact")  # fmt: skip
-
-
-def _middle(counts: list[int]) -> str:
-    return f"{sorted(counts)[len(counts) // 2]}" if counts else "no"
 
 
 C18 = Check(

@@ -110,7 +110,7 @@ def _leak(study: Study, case: tuple[float, ...]) -> dict[str, Any]:
     b = device * half
     B = share * (b - half if b > half else half)
     motion = quickest_motion(K, B, b, 1.0 / rate, _STEPS)
-    turnover = (b + half + B) * float(((motion.readings[1:] - motion.readings[:-1]) ** 2).sum()) * rate
+    turnover = (b + half + B) * float((np.diff(motion.positions) ** 2).sum()) * rate
     return {
         "rate [Hz]": rate, "stiffness [N/m]": K, "device damping [of KT/2]": device,
         "virtual damping [of the bound]": share if b > half else None,

@@ -76,14 +76,19 @@ class LawCount:
 class Law(NamedTuple):
     """A law: its statement in words and its check, which returns None if the law does not apply.
 
-    The check of a law of impacts takes (ImpactCase, resolver, Bounds), that of a trajectory a `Trajectory`.
+    The check of a law of impacts takes (ImpactCase, resolver, Bounds), that of a trajectory a `Trajectory`, and that of
+    the engine a case that `draw` makes with a random generator and a subject, by default `ours`.
     """
 
     statement: str
-    check: Callable[..., LawResidual | None]
+    check: Callable[..., Any]
+    draw: Any = None
+    ours: Any = None
 
 
-def law(table: dict[str, Law], name: str, statement: str) -> Callable[[Measure], Measure]:
+def law(
+    table: dict[str, Law], name: str, statement: str, draw: Any = None, ours: Any = None
+) -> Callable[[Measure], Measure]:
     """Add the decorated function to a table of laws; it returns a value and its tolerance, or None."""
 
     def added(measure: Measure) -> Measure:
@@ -91,7 +96,7 @@ def law(table: dict[str, Law], name: str, statement: str) -> Callable[[Measure],
             found = measure(*given)
             return None if found is None else LawResidual(name, *found)
 
-        table[name] = Law(statement, check)
+        table[name] = Law(statement, check, draw, ours)
         return measure
 
     return added

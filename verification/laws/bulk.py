@@ -63,19 +63,15 @@ class BulkImpacts:
         """10·d·ε·√κ(M)."""
         return 10.0 * self.coordinates * EPS * np.sqrt(self.condition)
 
-    @property
-    def cholesky_bound(self) -> Floats:
-        """d·ε·κ(M): bound of the gain from a Cholesky factor without the clamp."""
-        return self.coordinates * EPS * self.condition
-
     def by_condition(self) -> Iterator[Row]:
         """Yield the row of each decade of κ(M), and that of all impacts."""
         decade = np.floor(np.log10(self.condition) + 1e-9).astype(int)
+        by_cholesky = self.gain / (self.coordinates * EPS * self.condition)  # the bound without the clamp
         groups = [(f"1e{k}", decade == k) for k in np.unique(decade)]
         for name, chosen in [*groups, ("all", np.ones(len(decade), bool))]:
             ratio, gains = (self.gain / self.bound)[chosen], self.gain[chosen]
             yield {"condition of M from": name, "impacts": int(np.sum(chosen)), GAIN: float(np.max(gains)),
-                   SHARE: float(np.max(ratio)), "gain / (d ε κ)": float(np.max(gains / self.cholesky_bound[chosen])),
+                   SHARE: float(np.max(ratio)), "gain / (d ε κ)": float(np.max(by_cholesky[chosen])),
                    ABOVE: int(np.sum(ratio > 1.0)),
                    "largest restitution residual": float(np.max(self.residual[chosen]))}
 

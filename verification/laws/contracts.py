@@ -136,7 +136,7 @@ def pushing_contacts_meet_restitution(case: ImpactCase, resolver: Resolver, boun
     """|pᵀ(γ⁺ + e γ⁻)| / |u⁻|² = |Δu·(u⁺ + e u⁻)| / |u⁻|²: known without p, which redundant rows do not determine."""
     if not _all_approach(case) or case.speed == 0.0:
         return None
-    u, change = case.lower.T @ case.velocity, _change(case, resolver)
+    u, change = case.u, _change(case, resolver)
     value = abs(float(change @ (change + (1.0 + case.restitution) * u))) / case.speed**2
     return value, 2.0 * bounds.restitution
 
@@ -148,7 +148,7 @@ def mixed_impacts_follow_newton_or_poisson(case: ImpactCase, resolver: Resolver,
     before = _normal_velocities(case, case.velocity)
     if not case.is_separated or case.speed == 0.0 or not np.any(before < -TOUCHING) or not np.any(before > TOUCHING):
         return None
-    u, rows, e = case.lower.T @ case.velocity, case.unit_rows, case.restitution
+    u, rows, e = case.u, case.unit_rows, case.restitution
     newton = u + (1.0 + e) * (rows.T @ least_push(rows, -u))
     poisson = newton + rows.T @ least_push(rows, -newton)
     found = case.lower.T @ own_outcome(resolver, case)

@@ -1,8 +1,8 @@
 """Laws that need more than an impact resolver: a row budget, device limits, a wall or a device held by the hand, inputs
 of any size.
 
-Each law draws its own cases and judges its own kind of subject; `ours` is the engine's subject. To add a law, write its
-functions here, add a line to ENGINE_LAWS, and add a planted fault to `planted`.
+Each law draws its own cases and judges its own kind of subject; the last name in `@law` is the engine's subject. To add
+a law, write its functions here, and add a planted fault to `planted`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,16 +20,12 @@ from iapb.contact.kernels.resting import normal_force
 from iapb.errors import IapbError
 from iapb.run import Run
 from verification.impacts import Floats, ImpactCase, draw_case, draw_extreme_case
-from verification.laws.bounds import EPS, FACTORED, KIT, LawCount, LawResidual, relative_gain
+from verification.laws.bounds import EPS, FACTORED, KIT, Found, Law, LawCount, law, relative_gain
 from verification.laws.resolver import Resolver, outcome
 from verification.laws.scenes import ROOM, SceneCase, Values, draw_scene
-from verification.stability.device_port import (
-    COUPLER_WORLD,
-    RADIUS,
-    DeviceLoop,
-    actuator_forces,
-    leaked,
-)
+from verification.stability.device_port import COUPLER_WORLD, RADIUS, DeviceLoop, actuator_forces, leaked
+
+ENGINE_LAWS: dict[str, Law] = {}  # the seeds of random cases depend on the order: add at the end
 
 
 # Anytime property: every truncation of the projector is passive, so a row budget never costs passivity.
@@ -38,12 +34,14 @@ def budgets(case: ImpactCase) -> range:
     return range(min(case.contacts, case.coordinates) + 1)
 
 
-def every_budget_is_passive(case: ImpactCase, subject: Callable[..., Any]) -> LawResidual:
+@law(ENGINE_LAWS, "truncation", "a result cut short at any number of rows is passive, and none is no impulse",
+     partial(draw_case, largest_condition=1e12), resolve_impact)
+def every_budget_is_passive(case: ImpactCase, subject: Callable[..., Any]) -> Found:
     """Largest relative energy gain over all budgets; infinite if a budget of 0 rows still gives an impulse."""
     answers = [outcome(partial(subject, budget=budget), case) for budget in budgets(case)]
     worst = max(relative_gain(case.mass_matrix, case.velocity, v_plus) for v_plus in answers)
     idle = np.array_equal(answers[0], case.velocity)
-    return LawResidual("truncation", worst if idle else np.inf, FACTORED.energy_gain(case))
+    return worst if idle else np.inf, FACTORED.energy_gain(case)
 
 
 # An impulse that the device cannot render (paper section VI). One factor for the whole group keeps tool and device
@@ -65,7 +63,7 @@ Renderer = Callable[[Floats, float, Floats], tuple[Floats, Floats]]
 def draw_limited(rng: np.random.Generator) -> LimitedImpact:
     """Draw an impact and force limits between 0.01 and 10 times the force that its impulse needs, or infinite."""
     case = draw_case(rng)
-    Q, u = case.row_space, case.lower.T @ case.velocity
+    Q, u = case.row_space, case.u
     impulse = -(1.0 + case.restitution) * (case.lower @ (Q.T @ (Q @ u)))
     dt = float(rng.choice([1.0 / 512.0, 1e-3]))
     limit = (np.abs(impulse) / dt + 1e-9) * 10.0 ** rng.uniform(-2.0, 1.0, size=len(u))
@@ -94,13 +92,16 @@ def saturation_counterexample() -> LimitedImpact:
     return LimitedImpact(case, -normal * float(normal @ velocity), 1e-3, np.array([1000.0, 10.0]))
 
 
-def limited_impulses_are_passive(case: LimitedImpact, subject: Renderer) -> LawResidual:
+@law(ENGINE_LAWS, "device_limits",
+     "an impulse cut to the device's limits by one factor per group is passive for tool and device",
+     draw_limited, scaled)
+def limited_impulses_are_passive(case: LimitedImpact, subject: Renderer) -> Found:
     """Larger relative energy gain of tool and device, both from v⁻; infinite if the device exceeds its limit."""
     tool_impulse, device_force = subject(case.impulse.copy(), case.dt, case.force_limit.copy())
     mass, v = case.impact.mass_matrix, case.impact.velocity
     gains = [relative_gain(mass, v, v + np.linalg.solve(mass, p)) for p in (tool_impulse, case.dt * device_force)]
     value = np.inf if np.any(np.abs(device_force) > case.force_limit) else max(gains)
-    return LawResidual("device_limits", value, KIT.comparison(case.impact))
+    return value, KIT.comparison(case.impact)
 
 
 # The engine splits the contacts of a step into groups and resolves each separately: two scenes without common contacts
@@ -145,7 +146,9 @@ def _room(bodies: list[Values], name: str, x: float) -> Values:
     return {"bodies": [moved(body) for body in bodies], "walls": walls}
 
 
-def groups_apart_move_alike(case: TwoRooms, subject: Callable[[SceneCase], Run]) -> LawResidual:
+@law(ENGINE_LAWS, "group_splitting", "two groups that share nothing move the same, simulated together or apart",
+     draw_rooms, SceneCase.simulate)
+def groups_apart_move_alike(case: TwoRooms, subject: Callable[[SceneCase], Run]) -> Found:
     """Distance between the states of the joint and the separate run, at the first instant at which they differ.
 
     A compiled sum over more entries may add them in another order, so the last bits may differ. Later instants are not
@@ -154,7 +157,7 @@ def groups_apart_move_alike(case: TwoRooms, subject: Callable[[SceneCase], Run])
     together, one, other = subject(case.together), subject(case.one), subject(case.other)
     d = one.v.shape[1]
     worst = max(_first_difference(together, one, slice(0, d)), _first_difference(together, other, slice(d, None)))
-    return LawResidual("group_splitting", worst, 100.0 * together.v.shape[1] * EPS)
+    return worst, 100.0 * together.v.shape[1] * EPS
 
 
 def _first_difference(together: Run, apart: Run, of: slice) -> float:
@@ -185,28 +188,29 @@ Wall = Callable[[float, float, float, float], float]  # (depth x [m], its rate [
 
 
 @dataclass(frozen=True)
-class WallInTheHand:
-    """Constants of the wall and the device (SI), and the readings (n + 1,) of the device's position; the first is 0."""
+class HeldDevice:
+    """A loop, the device's physical damping [N s/m], and the positions (n + 1,) [m] that the hand imposes.
 
-    stiffness: float
-    damping: float
+    The loop of a wall alone has the wall's constants only, and its first position is 0.
+    """
+
+    loop: DeviceLoop
     device_damping: float
-    dt: float
-    readings: Floats
+    positions: Floats
 
     @property
-    def bound(self) -> float:
-        """KT/2 + |B|: the least device damping that guarantees passivity."""
-        return 0.5 * self.stiffness * self.dt + abs(self.damping)
+    def turnover(self) -> float:
+        """Energy exchanged with wall or coupler, and with the damper [J]."""
+        return (self.device_damping + self.loop.bound) * float(np.sum(np.diff(self.positions) ** 2)) / self.loop.dt
 
 
-def draw_wall(rng: np.random.Generator) -> WallInTheHand:
+def draw_wall(rng: np.random.Generator) -> HeldDevice:
     """Draw K and B over decades, T, b at or above the bound, and a motion from slow to half the sampling rate."""
     K, B = 10.0 ** rng.uniform(1.0, 5.0), float(rng.choice([0.0, 1.0])) * 10.0 ** rng.uniform(-1.0, 3.0)
     dt = float(rng.choice([1.0 / 512.0, 1e-3, 1e-4]))
     x = hand_motion(rng, int(rng.integers(50, 800)))
-    margin = float(rng.choice([1.0, 1.0, rng.uniform(1.0, 3.0)]))
-    return WallInTheHand(K, B, margin * (0.5 * K * dt + abs(B)), dt, x - x[0])
+    loop, margin = DeviceLoop("wall", K, B, dt), float(rng.choice([1.0, 1.0, rng.uniform(1.0, 3.0)]))
+    return HeldDevice(loop, margin * loop.bound, x - x[0])
 
 
 def hand_motion(rng: np.random.Generator, n: int) -> Floats:
@@ -217,7 +221,7 @@ def hand_motion(rng: np.random.Generator, n: int) -> Floats:
     return np.asarray(1e-3 * 10.0 ** rng.uniform(-2.0, 1.0) * (rng.uniform() * sine + rng.uniform() * walk))
 
 
-def quickest_motion(K: float, B: float, b: float, dt: float, steps: int = 4000, half: float = 5e-4) -> WallInTheHand:
+def quickest_motion(K: float, B: float, b: float, dt: float, steps: int = 4000, half: float = 5e-4) -> HeldDevice:
     """Return the motion to which a sampled wall gives most energy.
 
     The device enters the wall slowly, so deep that the wall always pushes. Then it moves back and forth by `half` [m]
@@ -225,7 +229,8 @@ def quickest_motion(K: float, B: float, b: float, dt: float, steps: int = 4000, 
     """
     depth = 2.0 * half + 4.0 * B * half / (K * dt)
     entering = np.linspace(0.0, depth, steps // 4)
-    return WallInTheHand(K, B, b, dt, np.concatenate([entering, depth + half * (-1.0) ** np.arange(steps)]))
+    return HeldDevice(DeviceLoop("wall", K, B, dt), b,
+                      np.concatenate([entering, depth + half * (-1.0) ** np.arange(steps)]))
 
 
 def penalty_wall(depth: float, rate: float, K: float, B: float) -> float:
@@ -233,19 +238,35 @@ def penalty_wall(depth: float, rate: float, K: float, B: float) -> float:
     return float(normal_force(-depth, -rate, K, B, True)) if depth > 0.0 else 0.0
 
 
-def leak(case: WallInTheHand, wall: Wall) -> float:
+def leak(case: HeldDevice, wall: Wall) -> float:
     """Largest net energy [J] that the port has returned to the hand, for uniform motion between the readings."""
-    x = case.readings
-    rate = np.concatenate([[0.0], np.diff(x) / case.dt])[:-1]
-    force = [wall(float(a), float(r), case.stiffness, case.damping) for a, r in zip(x[:-1], rate, strict=True)]
-    return leaked(x, -np.array(force), case.device_damping, case.dt)
+    x, loop = case.positions, case.loop
+    rate = np.concatenate([[0.0], np.diff(x) / loop.dt])[:-1]
+    force = [wall(float(a), float(r), loop.stiffness, loop.damping) for a, r in zip(x[:-1], rate, strict=True)]
+    return leaked(x, -np.array(force), case.device_damping, loop.dt)
 
 
-def hand_port_is_passive(case: WallInTheHand, subject: Wall) -> LawResidual:
+@law(ENGINE_LAWS, "hand_port", "the hand gets no energy out of a sampled wall while b ≥ KT/2 + |B|",
+     draw_wall, penalty_wall)
+def hand_port_is_passive(case: HeldDevice, subject: Wall) -> Found:
     """Leak relative to the energy exchanged with wall and damper; the tolerance covers the rounding of n sums."""
-    turnover = (case.device_damping + case.bound) * float(np.sum(np.diff(case.readings) ** 2)) / case.dt
-    relative = leak(case, subject) / turnover if turnover > 0.0 else 0.0
-    return LawResidual("hand_port", relative, 4.0 * len(case.readings) * EPS)
+    relative = leak(case, subject) / case.turnover if case.turnover > 0.0 else 0.0
+    return relative, 4.0 * len(case.positions) * EPS
+
+
+@law(ENGINE_LAWS, "extremes", "every finite input gives a finite motion or an error by name",
+     draw_extreme_case, resolve_impact)
+def finite_or_named(case: ImpactCase, subject: Resolver) -> Found:
+    """0 if the resolver returns a finite velocity or raises an IapbError, else 1; the tolerance is 0."""
+    try:
+        answer = subject(*case.given())
+        v_plus = np.asarray(getattr(answer, "velocity", answer))
+        fine = v_plus.shape == case.velocity.shape and bool(np.all(np.isfinite(v_plus)))
+    except IapbError:
+        fine = True
+    except Exception:  # any other exception breaks the law
+        fine = False
+    return 0.0 if fine else 1.0, 0.0
 
 
 # The same at the port of a whole device scene: a unilateral coupler to a tool on a rigid wall. Assume that
@@ -253,15 +274,6 @@ def hand_port_is_passive(case: WallInTheHand, subject: Wall) -> LawResidual:
 # pressing. Then no motion extracts energy from the loop of coupler, tool, rigid contact and device, because the tool
 # rests and the coupler acts as the wall above. `verification.stability.device_port` measures the other cases.
 HELD_STEPS, WAY = 150, 10  # steps of the motion; how much slower the entry is, so that its damping adds little energy
-
-
-@dataclass(frozen=True)
-class HeldDevice:
-    """A loop, the device's physical damping [N s/m], and the positions (n + 1,) [m] that the hand imposes."""
-
-    loop: DeviceLoop
-    device_damping: float
-    positions: Floats
 
 
 def draw_held_device(rng: np.random.Generator) -> HeldDevice:
@@ -279,73 +291,24 @@ def draw_held_device(rng: np.random.Generator) -> HeldDevice:
     return HeldDevice(loop, margin * loop.bound, np.concatenate([way, motion]))
 
 
-def device_port_is_passive(case: HeldDevice, subject: Callable[[DeviceLoop, Floats], Floats]) -> LawResidual:
+@law(ENGINE_LAWS, "device_port",
+     "the hand gets no energy out of a device coupled to a tool on a rigid wall while b ≥ K_cpl T/2 + B_cpl",
+     draw_held_device, actuator_forces)
+def device_port_is_passive(case: HeldDevice, subject: Callable[[DeviceLoop, Floats], Floats]) -> Found:
     """Leak relative to the energy exchanged with coupler and damper.
 
     The tolerance covers the rounding of n sums and of the coupler's extension, which is a difference of two positions.
     """
-    x, dt = case.positions, case.loop.dt
-    out, steps = leaked(x, subject(case.loop, x), case.device_damping, dt), np.diff(x)
-    turnover = (case.device_damping + case.loop.bound) * float(np.sum(steps**2)) / dt
-    places = RADIUS / float(np.sqrt(np.mean(steps**2)))
-    return LawResidual("device_port", out / turnover, 4.0 * len(x) * EPS * (1.0 + places))
+    x = case.positions
+    out = leaked(x, subject(case.loop, x), case.device_damping, case.loop.dt)
+    places = RADIUS / float(np.sqrt(np.mean(np.diff(x) ** 2)))
+    return out / case.turnover, 4.0 * len(x) * EPS * (1.0 + places)
 
 
-def finite_or_named(case: ImpactCase, subject: Resolver) -> LawResidual:
-    """0 if the resolver returns a finite velocity or raises an IapbError, else 1; the tolerance is 0."""
-    try:
-        answer = subject(*case.given())
-        v_plus = np.asarray(getattr(answer, "velocity", answer))
-        fine = v_plus.shape == case.velocity.shape and bool(np.all(np.isfinite(v_plus)))
-    except IapbError:
-        fine = True
-    except Exception:  # any other exception breaks the law
-        fine = False
-    return LawResidual("extremes", 0.0 if fine else 1.0, 0.0)
-
-
-class EngineLaw(NamedTuple):
-    """A law: its statement in words, the generator of its cases, its check and the engine's subject."""
-
-    statement: str
-    draw: Callable[[np.random.Generator], Any]
-    check: Callable[[Any, Any], LawResidual]
-    ours: Callable[..., Any]
-
-
-ENGINE_LAWS: dict[str, EngineLaw] = {
-    "truncation": EngineLaw(
-        "a result cut short at any number of rows is passive, and none is no impulse",
-        partial(draw_case, largest_condition=1e12), every_budget_is_passive, resolve_impact),
-    "device_limits": EngineLaw(
-        "an impulse cut to the device's limits by one factor per group is passive for tool and device",
-        draw_limited, limited_impulses_are_passive, scaled),
-    "group_splitting": EngineLaw(
-        "two groups that share nothing move the same, simulated together or apart",
-        draw_rooms, groups_apart_move_alike, SceneCase.simulate),
-    "hand_port": EngineLaw(
-        "the hand gets no energy out of a sampled wall while b ≥ KT/2 + |B|",
-        draw_wall, hand_port_is_passive, penalty_wall),
-    "extremes": EngineLaw(
-        "every finite input gives a finite motion or an error by name",
-        draw_extreme_case, finite_or_named, resolve_impact),
-    "device_port": EngineLaw(
-        "the hand gets no energy out of a device coupled to a tool on a rigid wall while b ≥ K_cpl T/2 + B_cpl",
-        draw_held_device, device_port_is_passive, actuator_forces),
-}
-
-
-def judge_engine_law(
-    name: str, subject: Callable[..., Any] | None = None, cases: int = 300, seed: int = 0
-) -> tuple[LawCount, Any]:
-    """Check one law on `cases` random cases; return the counts and the first case that breaks the law, or None.
-
-    subject : replaces the engine's own subject
-    """
-    law, rng = ENGINE_LAWS[name], np.random.default_rng([seed, list(ENGINE_LAWS).index(name)])
-    count, broken = LawCount(name), None
+def judge_engine_law(name: str, subject: Callable[..., Any] | None = None, cases: int = 300, seed: int = 0) -> LawCount:
+    """Check one law on `cases` random cases; `subject` replaces the engine's own subject."""
+    one, rng = ENGINE_LAWS[name], np.random.default_rng([seed, list(ENGINE_LAWS).index(name)])
+    count = LawCount(name)
     for _ in range(cases):
-        case = law.draw(rng)
-        if not count.add(law.check(case, law.ours if subject is None else subject)) and broken is None:
-            broken = case
-    return count, broken
+        count.add(one.check(one.draw(rng), one.ours if subject is None else subject))
+    return count

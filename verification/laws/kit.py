@@ -357,7 +357,12 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
     """Check every impact against its laws; return the number of random impacts tried within the time limit."""
     watched = Watched(trial.resolver)
     for done, case, mixed in _drawn(trial):
-        for name in _laws_for(case, done, tuple(trial.laws)):
+        large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
+        for k, name in enumerate(trial.laws):
+            # of the laws that need more than one call, a large impact is checked by one in turn
+            if (large and name.removeprefix("unequal_") not in OF_ONE_CALL
+                    and (done // LARGE_EVERY - k) % len(trial.laws)):
+                continue
             if time.monotonic() > ends:
                 return max(0, done - 1)
             own = mixed if name in UNEQUAL_LAWS else case
@@ -369,14 +374,6 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
         if progress is not None and done > 0:
             progress(done, trial.impacts)
     return trial.impacts
-
-
-def _laws_for(case: ImpactCase, number: int, laws: tuple[str, ...]) -> Iterator[str]:
-    """Yield every law; for a large impact only the laws that need one call, and one of the others in turn."""
-    large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
-    for k, name in enumerate(laws):
-        if not large or name.removeprefix("unequal_") in OF_ONE_CALL or (number // LARGE_EVERY - k) % len(laws) == 0:
-            yield name
 
 
 def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:

@@ -12,17 +12,9 @@ import numpy as np
 
 from iapb.run import Run
 from iapb.system import System
-from verification.impacts import Floats
+from verification.impacts import Floats, ImpactCase
 from verification.laws.engine import Wall, saturated
-from verification.laws.resolver import (
-    RANK_CUT,
-    Resolver,
-    back,
-    projecting,
-    row_space,
-    sound_resolver,
-    whitened,
-)
+from verification.laws.resolver import RANK_CUT, Resolver, projecting, row_space, sound_resolver, whitened
 from verification.laws.scenes import SceneCase
 from verification.stability.device_port import DeviceLoop, actuator_forces
 
@@ -47,9 +39,9 @@ def wrong_sign(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 def transposed_factor(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Uses L instead of Lᵀ."""
-    parts = whitened(M, J, v)
-    Q, u = row_space(parts.rows), parts.lower @ v
-    return np.linalg.solve(parts.lower, u - (1.0 + e) * (Q.T @ (Q @ u)))
+    case = ImpactCase(M, J, v)
+    Q, u = row_space(case.unit_rows), case.lower @ v
+    return np.linalg.solve(case.lower, u - (1.0 + e) * (Q.T @ (Q @ u)))
 
 
 def per_body_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -57,41 +49,39 @@ def per_body_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return sound_resolver(M, np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)]), v, e)
 
 
-def one_after_the_other(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+@whitened
+def one_after_the_other(A: Floats, u: Floats, e: float) -> Floats:
     """Resolves each contact once, in order, so later contacts undo earlier ones."""
-    parts = whitened(M, J, v)
-    u = parts.u.copy()
-    for row in parts.rows:
-        u -= (1.0 + e) * (row @ u) * row
-    return back(parts, u)
+    for row in A:
+        u = u - (1.0 + e) * (row @ u) * row
+    return u
 
 
-def double_counted(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+@whitened
+def double_counted(A: Floats, u: Floats, e: float) -> Floats:
     """Adds the impulses that each contact would need alone."""
-    parts = whitened(M, J, v)
-    return back(parts, parts.u - (1.0 + e) * (parts.rows.T @ (parts.rows @ parts.u)))
+    return u - (1.0 + e) * (A.T @ (A @ u))
 
 
-def one_gradient_step(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+@whitened
+def one_gradient_step(A: Floats, u: Floats, e: float) -> Floats:
     """Stops an iteration after its first step, which depends on how often a row is repeated."""
-    parts = whitened(M, J, v)
-    largest = np.linalg.norm(parts.rows, 2) ** 2 if parts.rows.any() else 1.0
-    return back(parts, parts.u - (1.0 + e) / largest * (parts.rows.T @ (parts.rows @ parts.u)))
+    return u - (1.0 + e) / (np.linalg.norm(A, 2) ** 2 if A.any() else 1.0) * (A.T @ (A @ u))
 
 
 def unscaled_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Decides the rank without scaling the rows, so short rows are lost."""
-    lower = np.linalg.cholesky(M)
-    _, values, right = np.linalg.svd(np.linalg.solve(lower, J.T).T, full_matrices=False)
-    Q, u = right[values > 1e-6 * np.max(values, initial=0.0)], lower.T @ v
-    return np.linalg.solve(lower.T, u - (1.0 + e) * (Q.T @ (Q @ u)))
+    case = ImpactCase(M, J, v)
+    _, values, right = np.linalg.svd(case.rows, full_matrices=False)
+    Q, u = right[values > 1e-6 * np.max(values, initial=0.0)], case.u
+    return np.linalg.solve(case.lower.T, u - (1.0 + e) * (Q.T @ (Q @ u)))
 
 
-def three_rows_at_most(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+@whitened
+def three_rows_at_most(A: Floats, u: Floats, e: float) -> Floats:
     """Uses at most three rows for all groups together."""
-    parts = whitened(M, J, v)
-    Q = row_space(parts.rows)[:3]
-    return back(parts, parts.u - (1.0 + e) * (Q.T @ (Q @ parts.u)))
+    Q = row_space(A)[:3]
+    return u - (1.0 + e) * (Q.T @ (Q @ u))
 
 
 def makes_warm_start() -> Resolver:
@@ -111,13 +101,13 @@ def writes_on_its_arguments(M: Floats, J: Floats, v: Floats, e: float) -> Floats
     return v
 
 
-def each_contact_its_own_restitution(M: Floats, J: Floats, v: Floats, e: Floats) -> Floats:
+@whitened
+def each_contact_its_own_restitution(A: Floats, u: Floats, e: Floats) -> Floats:
     """Newton's law as equalities with a restitution per row: every row meets it, but it can create energy."""
     if np.ndim(e) == 0:
-        return sound_resolver(M, J, v, float(e))
-    parts = whitened(M, J, v)
-    wanted = (1.0 + np.asarray(e)) * (parts.rows @ parts.u)
-    return back(parts, parts.u - np.linalg.pinv(parts.rows, rcond=RANK_CUT) @ wanted)
+        Q = row_space(A)
+        return u - (1.0 + e) * (Q.T @ (Q @ u))
+    return u - np.linalg.pinv(A, rcond=RANK_CUT) @ ((1.0 + np.asarray(e)) * (A @ u))
 
 
 PLANTED_BUGS: dict[str, Fault] = {

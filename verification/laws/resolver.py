@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from functools import wraps
+from typing import Any
 
 import numpy as np
 
@@ -94,34 +95,27 @@ def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> F
 RANK_CUT, ROUNDING = 1e-10, 1e-12
 
 
-class Parts(NamedTuple):
-    """M = L Lᵀ, u = Lᵀv, unit rows of A."""
+def whitened(change: Callable[..., Floats]) -> Resolver:
+    """Return the resolver with u⁺ = change(A, u, e) for u = Lᵀv, M = L Lᵀ and the unit rows A."""
 
-    lower: Floats
-    u: Floats
-    rows: Floats
+    @wraps(change)
+    def resolver(M: Floats, J: Floats, v: Floats, *given: Any, **more: Any) -> Floats:
+        case = ImpactCase(M, J, v)
+        return np.linalg.solve(case.lower.T, change(case.unit_rows, case.u, *given, **more))
 
-
-def whitened(M: Floats, J: Floats, v: Floats) -> Parts:
-    lower = np.linalg.cholesky(M)
-    rows = np.linalg.solve(lower, J.T).T
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    return Parts(lower, lower.T @ v, np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0))
+    del resolver.__wrapped__  # the arguments are those of a resolver
+    return resolver
 
 
-def row_space(rows: Floats, cut: float = RANK_CUT) -> Floats:
-    _, values, right = np.linalg.svd(rows, full_matrices=False)
+def row_space(A: Floats, cut: float = RANK_CUT) -> Floats:
+    _, values, right = np.linalg.svd(A, full_matrices=False)
     return right[values > cut]
 
 
-def back(parts: Parts, u_plus: Floats) -> Floats:
-    return np.linalg.solve(parts.lower.T, u_plus)
-
-
-def projecting(M: Floats, J: Floats, v: Floats, factor: float, cut: float = RANK_CUT) -> Floats:
-    parts = whitened(M, J, v)
-    Q = row_space(parts.rows, cut)
-    return back(parts, parts.u - factor * (Q.T @ (Q @ parts.u)))
+@whitened
+def projecting(A: Floats, u: Floats, factor: float, cut: float = RANK_CUT) -> Floats:
+    Q = row_space(A, cut)
+    return u - factor * (Q.T @ (Q @ u))
 
 
 def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:

@@ -53,24 +53,26 @@ def draw_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
     """Return a random planar scene of `steps` steps, with its world and rendering."""
     bodies = _bodies(rng)
     return _drawn(rng, steps, {"name": "random_scene"}, (256, 512, 1000, 2000), bodies, _walls, (0.5, [0.0, -9.81]),
-                  min(body["mass"] for body in bodies), _add_hand)  # fmt: skip
+                  min(body["mass"] for body in bodies), ([2.0, 2.0, 0.05], [15.0, 15.0, 1.0], (0.3, 1.0)))
 
 
 def draw_spatial_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
     """Return a random spatial scene of `steps` steps, with its world and rendering."""
     bodies = _spatial_bodies(rng)
     return _drawn(rng, steps, {"name": "random_scene_in_space", "dimensions": 3}, (512, 1000, 2000), bodies, _room,
-                  (0.6, [0.0, 0.0, -9.81]), min(body["mass"] for body in bodies) / SOFTER, _add_spatial_hand)
+                  (0.6, [0.0, 0.0, -9.81]), min(body["mass"] for body in bodies) / SOFTER,
+                  ([2.0] * 3 + [0.05] * 3, [15.0] * 3 + [1.0] * 3, (0.0, 0.7)))
 
 
 def _drawn(
     rng: np.random.Generator, steps: int, head: Values, rates: Sequence[int], bodies: list[Values],
     walls: Callable[[np.random.Generator], list[Values]], gravity: tuple[float, list[float]], least_mass: float,
-    add_hand: Callable[[np.random.Generator, Values], None],
+    hand: tuple[list[float], list[float], tuple[float, float]],
 ) -> SceneCase:
     """Return a scene of these bodies and draw the rest.
 
     gravity : share of the scenes that have gravity, and its field [m/s²]
+    hand : scale of its force and torque, the limits of its device, and the draws from [0, 1) for which it has a device
     """
     values: Values = {**head, "rate": float(rng.choice(rates)), "bodies": bodies, "walls": walls(rng)}
     values["duration"], values["integrator"] = steps / values["rate"], "semi_implicit_euler"
@@ -79,7 +81,7 @@ def _drawn(
     values["contact"] = _contact(rng, least_mass, 1.0 / values["rate"])
     held = rng.random() < 0.4
     if held:
-        add_hand(rng, values)
+        _add_hand(rng, values, *hand)
     impulses = rng.random() < 0.8
     rendering = str(rng.choice(RENDERINGS)) if held and impulses else "full"
     return SceneCase(values, "IAPB" if impulses else "PB", rendering)
@@ -163,17 +165,15 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     return contact
 
 
-def _add_hand(rng: np.random.Generator, values: Values) -> None:
-    """Add a hand on the first free body, sometimes through a device with limits, delay and quantised sensors."""
-    values["hand"] = {"body": "body_0", "force": [round(x, 3) for x in rng.normal(scale=[2.0, 2.0, 0.05])]}
-    if rng.random() < 0.3:
+def _add_hand(
+    rng: np.random.Generator, values: Values, scale: list[float], limits: list[float], through: tuple[float, float]
+) -> None:
+    """Add a hand on the first free body, usually through a device, perhaps with limits, delay and quantised sensors."""
+    values["hand"] = {"body": "body_0", "force": [round(float(x), 3) for x in rng.normal(scale=scale)]}
+    if not through[0] <= rng.random() < through[1]:
         return
-    mass, inertia = values["bodies"][0]["mass"], values["bodies"][0]["inertia"]
-    _add_coupling(rng, values, np.array([mass, mass, inertia]), [15.0, 15.0, 1.0])
-
-
-def _add_coupling(rng: np.random.Generator, values: Values, inertia: np.ndarray, limits: list[float]) -> None:
-    """Add a four-channel controller for a tool of these inertias, and a device, perhaps with limits and delay."""
+    body, turning = values["bodies"][0], np.ravel(values["bodies"][0]["inertia"])
+    inertia = np.array([body["mass"]] * (len(limits) - len(turning)) + turning.tolist())
     rate = 0.05 * values["rate"]  # of the coupling [1/s]: slow beside the step
     values["couplings"] = {"four_channel": {
         "stiffness": [float(f"{x:.6g}") for x in inertia * rate**2 * 0.3],
@@ -231,12 +231,3 @@ def _stack(rng: np.random.Generator) -> list[Values]:
     low, high = -ROOM + 0.5 * height - 1e-6, -ROOM + height + half - 2e-6
     return [below | {"position": [0.0, 0.0, low, 0.0, 0.0, 0.0, 1.0]},
             above | {"position": [0.003, -0.002, high, 0.0, 0.0, 0.0, 1.0]}]  # fmt: skip
-
-
-def _add_spatial_hand(rng: np.random.Generator, values: Values) -> None:
-    """Add a hand on the first free body, usually through a device: force, and torque about the world axes."""
-    force = rng.normal(scale=[2.0, 2.0, 2.0, 0.05, 0.05, 0.05])
-    values["hand"] = {"body": "body_0", "force": [round(float(x), 3) for x in force]}
-    if rng.random() < 0.7:
-        body = values["bodies"][0]
-        _add_coupling(rng, values, np.array([body["mass"]] * 3 + body["inertia"]), [15.0] * 3 + [1.0] * 3)

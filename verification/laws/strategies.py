@@ -48,11 +48,6 @@ def velocities(draw: st.DrawFn, mass: Floats) -> Floats:
     return np.linalg.eigh(mass)[1][:, 0] if kind == "light" else whole
 
 
-def restitutions() -> st.SearchStrategy[float]:
-    """e: one of 1, 0, −1 and 0.5, or any value in [−1, 1]."""
-    return st.one_of(st.sampled_from([1.0, 0.0, -1.0, 0.5]), st.floats(-1.0, 1.0))
-
-
 @st.composite
 def unequal_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
     """An impact with a separate restitution for each row."""
@@ -64,15 +59,13 @@ def unequal_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
 @st.composite
 def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int = 4) -> ImpactCase:
     """An impact with κ(M) up to about 10^largest_exponent."""
-    d = draw(st.integers(1, largest_size))
+    d, e = draw(st.integers(1, largest_size)), st.sampled_from([1.0, 0.0, -1.0, 0.5]) | st.floats(-1.0, 1.0)
     if draw(st.booleans()):
-        masses = 10.0 ** np.array(draw(st.lists(st.integers(-4, 0), min_size=d, max_size=d)), dtype=float)
-        mass: Floats = np.diag(masses)
-        return ImpactCase(
-            mass, cradle_rows(d), draw(velocities(mass)), draw(restitutions()), "cradle", np.ones((1, d))
-        )
+        powers = draw(st.lists(st.integers(-4, 0), min_size=d, max_size=d))
+        mass: Floats = np.diag(10.0 ** np.array(powers, dtype=float))
+        return ImpactCase(mass, cradle_rows(d), draw(velocities(mass)), draw(e), "cradle", np.ones((1, d)))
     mass, rows = draw(mass_matrices(d, largest_exponent)), draw(contact_jacobians(d))
-    return ImpactCase(mass, rows, draw(velocities(mass)), draw(restitutions()), "whole numbers")
+    return ImpactCase(mass, rows, draw(velocities(mass)), draw(e), "whole numbers")
 
 
 @st.composite

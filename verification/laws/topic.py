@@ -28,24 +28,18 @@ from verification.finding import (
     verdict_of_law,
 )
 from verification.impacts import ImpactCase
-from verification.laws import LAWS, PLANTED_BUGS, PassivityReport, bulk_impacts, check_passivity
+from verification.laws import (
+    LAWS,
+    PLANTED_BUGS,
+    PassivityReport,
+    bulk_impacts,
+    check_passivity,
+    engine,
+    planted,
+)
 from verification.laws.bounds import LawCount, relative_gain
 from verification.laws.bulk import ABOVE, GAIN, SHARE
-from verification.laws.engine import (
-    ENGINE_LAWS,
-    judge_engine_law,
-    limited_impulses_are_passive,
-    saturated,
-    saturation_counterexample,
-    scaled,
-)
 from verification.laws.kit import LawVerdict
-from verification.laws.planted import (
-    PLANTED_ENGINE_FAULTS,
-    PLANTED_TRAJECTORY_FAULTS,
-    each_contact_its_own_restitution,
-    first_occasion,
-)
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
 from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
 from verification.methods import gram_pinv
@@ -79,10 +73,10 @@ def _impact_law(study: Study, name: str) -> Row:
 
 def _engine_law(study: Study, name: str) -> Row:
     cases = SIMULATED if name in ("group_splitting", "device_port") else ENGINE_CASES
-    count, fault = judge_engine_law(name, cases=cases, seed=SEED)[0], PLANTED_ENGINE_FAULTS[name]
+    count, fault = engine.judge_engine_law(name, cases=cases, seed=SEED), planted.PLANTED_ENGINE_FAULTS[name]
     with np.errstate(all="ignore"):  # the faulty subjects may overflow
-        broken = judge_engine_law(name, fault.make(), cases=min(cases, FAULT_CASES), seed=SEED)[0]
-    return _row(ENGINE_LAWS[name].statement, count, fault.name, broken.failures > 0)
+        broken = engine.judge_engine_law(name, fault.make(), cases=min(cases, FAULT_CASES), seed=SEED)
+    return _row(engine.ENGINE_LAWS[name].statement, count, fault.name, broken.failures > 0)
 
 
 def _trajectories(study: Study) -> tuple[list[SceneCase], list[Trajectory], list[Trajectory]]:
@@ -103,10 +97,10 @@ def _trajectory_law(study: Study, name: str) -> Row:
     for one in every if name == "finite" else whole:
         if (found := law.check(one)) is not None:
             count.add(found)
-    run = first_occasion(name, scenes)
+    run = planted.first_occasion(name, scenes)
     residual = law.check(Trajectory(run)) if run is not None else None
     caught = residual is not None and not residual.passed
-    return _row(f"along a trajectory: {law.statement}", count, PLANTED_TRAJECTORY_FAULTS[name].__name__, caught)
+    return _row(f"along a trajectory: {law.statement}", count, planted.PLANTED_TRAJECTORY_FAULTS[name].__name__, caught)
 
 
 KINDS: dict[str, Callable[[Study, str], Row]] = {
@@ -115,7 +109,7 @@ KINDS: dict[str, Callable[[Study, str], Row]] = {
 
 def _laws(study: Study) -> Iterator[tuple[str, str]]:
     yield from (("impact", name) for name in LAWS)
-    yield from (("engine", name) for name in ENGINE_LAWS)
+    yield from (("engine", name) for name in engine.ENGINE_LAWS)
     yield from (("trajectory", name) for name in TRAJECTORY_LAWS)
 
 
@@ -194,7 +188,7 @@ def printed_formula() -> Finding:
 
 def restitution_per_contact() -> Finding:
     """Return the counterexample to the obvious extension of (15): equalities with one restitution per row."""
-    report, verdict, case, given = _found(each_contact_its_own_restitution, "unequal_kinetic_energy",
+    report, verdict, case, given = _found(planted.each_contact_its_own_restitution, "unequal_kinetic_energy",
                                           impacts=COUNTER_IMPACTS // 2, unequal_restitution=True)
     gain = relative_gain(case.mass_matrix, case.velocity, given["v⁺ as computed"])
     sentence = (
@@ -216,9 +210,10 @@ def _found(resolver: Any, law: str, **how: Any) -> tuple[PassivityReport, LawVer
 
 def saturation() -> Finding:
     """Return the counterexample to clipping an impulse component by component (section VI)."""
-    case = saturation_counterexample()
-    clipped, fitted = (limited_impulses_are_passive(case, subject) for subject in (saturated, scaled))
-    _, force = saturated(case.impulse, case.dt, case.force_limit)
+    case = engine.saturation_counterexample()
+    check = engine.ENGINE_LAWS["device_limits"].check
+    clipped, fitted = check(case, engine.saturated), check(case, engine.scaled)
+    _, force = engine.saturated(case.impulse, case.dt, case.force_limit)
     sentence = (
         f"A device that clips each component of an impulse by itself gains {clipped.value:.2%} of its kinetic energy, "
         f"while the tool loses energy. With one factor for the whole impulse both lose {-fitted.value:.2%}."

@@ -14,15 +14,7 @@ import numpy as np
 from reference.complementarity import ImpactProblem, solve
 from reference.exact import exact_impact
 from verification.impacts import Floats
-from verification.laws.resolver import (
-    RANK_CUT,
-    Resolver,
-    back,
-    least_push,
-    projecting,
-    sound_resolver,
-    whitened,
-)
+from verification.laws.resolver import RANK_CUT, Resolver, least_push, projecting, sound_resolver, whitened
 from verification.methods import gram_pinv
 
 TOO_MUCH = Fraction(10001, 10000)  # factor on the impulse that e requires
@@ -34,11 +26,10 @@ def reversed_velocity(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return -e * v
 
 
-def pulling_clipped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+@whitened
+def pulling_clipped(A: Floats, u: Floats, e: float) -> Floats:
     """Sets each pulling impulse to zero separately."""
-    parts = whitened(M, J, v)
-    p = -(1.0 + e) * (np.linalg.pinv(parts.rows.T, rcond=RANK_CUT) @ parts.u)
-    return back(parts, parts.u + parts.rows.T @ np.maximum(p, 0.0))
+    return u + A.T @ np.maximum(-(1.0 + e) * (np.linalg.pinv(A.T, rcond=RANK_CUT) @ u), 0.0)
 
 
 def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -78,9 +69,9 @@ BUGS: dict[str, tuple[str, Callable[[], Resolver]]] = {
 
 
 # Contacts that only push.
-def _pushing(M: Floats, J: Floats, v: Floats, factor: float) -> Floats:
-    parts = whitened(M, J, v)
-    return back(parts, parts.u + factor * (parts.rows.T @ least_push(parts.rows, -parts.u)))
+@whitened
+def _pushing(A: Floats, u: Floats, factor: float) -> Floats:
+    return u + factor * (A.T @ least_push(A, -u))
 
 
 def newton(M: Floats, J: Floats, v: Floats, e: float) -> Floats:

@@ -9,14 +9,7 @@ import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import ArgumentError
-from tests.verification.laws.faults import (
-    PUSHING,
-    SOUND,
-    TOO_MUCH,
-    newton,
-    no_friction,
-    returns_too_much,
-)
+from tests.verification.laws.faults import PUSHING, SOUND, TOO_MUCH, newton, no_friction, returns_too_much
 from verification import check_passivity
 from verification.laws import CONTRACTS, sound_resolver
 
