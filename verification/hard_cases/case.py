@@ -26,7 +26,7 @@ NEWTON_COULOMB = "Newton with Coulomb"  # Newton's law with Coulomb friction, as
 COULOMB = "ideal with friction"  # the rigid world with Coulomb friction; the paper's rigid worlds have none
 RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
 NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps
-DEPENDS_ON_ROUNDING = "depends on rounding"
+STABLE, DEPENDS_ON_ROUNDING = "stable", "depends on rounding"
 _NONE = float("nan")
 
 
@@ -124,10 +124,6 @@ class FrictionalCase(HardCase):
         impact = self.impact
         return impact.velocity(impact.passive_share()), 1
 
-    def newton_with_coulomb(self) -> tuple[Fraction, ...]:
-        """Return v⁺ by Kane and Levinson's equations, without reduced friction."""
-        return self.impact.velocity(1)
-
 
 @dataclass(frozen=True)
 class Measured:
@@ -173,14 +169,21 @@ AnyCase = HardCase | TrajectoryCase
 
 def on_floor(
     name: str, title: str, bodies: list[dict[str, Any]], contact: dict[str, Any], *, duration: float,
-    source: str = "textbook", rate: float = 1000.0, gravity: tuple[float, float] = (0.0, -9.81), level: float = 0.0,
-    **more: Any,
+    source: str = "textbook", rate: float = 1000.0, gravity: tuple[float, float] | None = (0.0, -9.81),
+    level: float = 0.0, **more: Any,
 ) -> Scene:  # fmt: skip
-    """Return a scene in the plane with a floor at a level [m], with the paper's forces; `more` are other sections."""
+    """Return a scene in the plane with the paper's forces; `more` are other sections, such as walls in place of the
+    floor at a level [m]."""
     floor = {"name": "floor", "kind": "half_plane", "point": [0.0, level], "normal": [0.0, 1.0]}
     given = {"name": name, "title": title, "source": source, "rate": rate, "duration": duration, "gravity": gravity,
              "bodies": bodies, "walls": [floor], "contact": {"forces": "paper", **contact}, **more}  # fmt: skip
     return scene_from_text(json.dumps(given))
+
+
+def ball(name: str, radius: float, at: float, **more: Any) -> dict[str, Any]:
+    """Return a ball of 1 kg that moves along x [m]; `more` are other fields of the body."""
+    return {"name": name, "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "position": [at],
+            "shapes": [{"kind": "circle", "radius": radius}], **more}  # fmt: skip
 
 
 def largest_gain(run: Run) -> float:
@@ -238,11 +241,6 @@ class HardCaseVerdict:
     clamp: float = _NONE
     seconds: float = _NONE
     smallest_fault: float = _NONE
-
-    @property
-    def is_stable(self) -> bool:
-        """Whether all quantities are within their bounds."""
-        return self.verdict == "stable"
 
 
 def smallest_fault(turns: Callable[[float], bool]) -> float:

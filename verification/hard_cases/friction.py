@@ -22,6 +22,7 @@ from verification.hard_cases.case import (
     NO_GAIN,
     Measured,
     TrajectoryCase,
+    ball,
     largest_gain,
     on_floor,
 )
@@ -113,8 +114,11 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
 
     def measure(run: Run) -> Measured:
         """Measure the distance from the motion of (6), relative to the creep distance."""
-        creep = _creep(0.99, run.steps, run.dt)
-        return Measured(largest_gain(run), NO_GAIN, abs(float(run.q[-1, 0]) / creep - 1.0), _KEPT)
+        x = v = 0.0
+        for _ in range(run.steps):
+            v += run.dt * _MU * _G * (0.99 - min(1.0, v / _CREEP))
+            x += run.dt * v
+        return Measured(largest_gain(run), NO_GAIN, abs(float(run.q[-1, 0]) / x - 1.0), _KEPT)
 
     return TrajectoryCase(
         "Creep of the regularised law, 1 % below the threshold", "(6) of the paper",
@@ -122,15 +126,6 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
         "0.99 v_threshold after a few steps",
         "(6) for one coordinate, step by step", _block(0.99, "regularised"), measure, ("IAPB", "PB"),
     )  # fmt: skip
-
-
-def _creep(share: float, steps: int, dt: float) -> float:
-    """Return the displacement by law (6) of a block that is pushed by a share of μ m g [m]."""
-    x = v = 0.0
-    for _ in range(steps):
-        v += dt * _MU * _G * (share - min(1.0, v / _CREEP))
-        x += dt * v
-    return x
 
 
 def _block(share: float, law: str = "coulomb") -> Scene:
@@ -242,8 +237,7 @@ def stick_slip() -> TrajectoryCase:
     height = 0.5 * _THICK - _G / (2.0 * _PRESS)
     plate = {"name": "plate", "joint": "planar", "mass": 1.0, "inertia": 0.001875, "velocity": [_STEADY, 0.0, 0.0],
              "shapes": [{"kind": "box", "size": [0.15, _THICK]}], "position": [0.0, height, 0.0]}
-    ball = {"name": "ball", "joint": "prismatic", "axis": [1, 0], "origin": [-0.075 - _THIN + depth, height],
-            "mass": 1e8, "shapes": [{"kind": "circle", "radius": _THIN}], "velocity": [_STEADY]}
+    presses = ball("ball", _THIN, 0.0, origin=[-0.075 - _THIN + depth, height], mass=1e8, velocity=[_STEADY])
     contact = {"stiffness": _PRESS, "damping": 0.0, "friction": _MU, "coherence_distance": 2e-3}
 
     def measure(run: Run) -> Measured:
@@ -265,7 +259,7 @@ def stick_slip() -> TrajectoryCase:
         "one slip, one stick, then for ever the same cycle of 2π/ω",
         "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "
         "v = V (1 − cos ωt), whatever it began with",
-        on_floor("stick_slip", "A plate pushed by a spring", [plate, ball], contact, rate=4000, duration=_PRESSED),
+        on_floor("stick_slip", "A plate pushed by a spring", [plate, presses], contact, rate=4000, duration=_PRESSED),
         measure, ("IAPB", "PB"),
     )  # fmt: skip
 

@@ -17,7 +17,8 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache, partial
@@ -42,6 +43,7 @@ from verification.hard_cases.case import (
     EPS,
     NEWTON_COULOMB,
     RESTITUTION_TOLERANCE,
+    STABLE,
     AnyCase,
     CaseAbsent,
     Floats,
@@ -117,9 +119,14 @@ def judge_hard_cases(
     for name in names:
         if name not in HARD_CASES:
             raise ArgumentError("cases", name, one_of(name, HARD_CASES))
-    found = (verdict for name in names for verdict in _of(name, wanted, simulate, failures))
+    tried: list[tuple[str, AnyCase, str]] = []
+    for name in names:
+        with suppress(CaseAbsent):
+            case = HARD_CASES[name]()
+            tried += [(name, case, method) for method in methods_for(case) if wanted is None or method in wanted]
     with one_thread():
-        return tuple(found)
+        return tuple(of_each(tried, lambda one: [judge_hard_case(one[1], one[2], simulate)], failures,
+                             lambda one: f"{one[0]}, {one[2]}"))  # fmt: skip
 
 
 def methods_for(case: AnyCase) -> tuple[str, ...]:
@@ -132,18 +139,6 @@ def methods_for(case: AnyCase) -> tuple[str, ...]:
 def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_world) -> HardCaseVerdict:
     """Return the verdict of one method on one impact, or of one world on one trajectory."""
     return judge_impact(case, method) if isinstance(case, HardCase) else _judge_motion(case, method, simulate)
-
-
-def _of(
-    name: str, wanted: tuple[str, ...] | None, simulate: Simulate, failures: list[Failure] | None
-) -> Iterator[HardCaseVerdict]:
-    try:
-        case = HARD_CASES[name]()
-    except CaseAbsent:
-        return
-    methods = (method for method in methods_for(case) if wanted is None or method in wanted)
-    yield from of_each(methods, lambda method: [judge_hard_case(case, method, simulate)], failures,
-                       lambda method: f"{name}, {method}")  # fmt: skip
 
 
 @cache
@@ -160,26 +155,26 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> HardC
     except IapbError as error:
         return HardCaseVerdict(case.name, world, _verdict_of(error), str(error), exact_rank=None)
     found, residual = case.measure(run), restitution_residual(run)
-    verdict, fault = "stable", math.nan
-    if not found.energy_gain <= found.energy_bound:
-        verdict = "gains energy"
-    elif residual > RESTITUTION_TOLERANCE:  # False for NaN: the run has no collision to judge
-        verdict = "restitution unmet"
-    elif not found.error <= found.error_bound:
-        verdict = "wrong motion"
-    else:  # a planted fault does not change the energies
+    restored = not residual > RESTITUTION_TOLERANCE  # NaN: the run has no collision to judge
+    verdict = _verdict(found.energy_gain <= found.energy_bound, restored, found.error <= found.error_bound)
 
-        def is_seen(size: float) -> bool:
-            moved = case.measure(faulty_motion(run, size))
-            return not moved.error <= moved.error_bound
+    def is_seen(size: float) -> bool:  # a planted fault does not change the energies
+        moved = case.measure(faulty_motion(run, size))
+        return not moved.error <= moved.error_bound
 
-        fault = smallest_fault(is_seen)
+    fault = smallest_fault(is_seen) if verdict == STABLE else math.nan
     seconds = float(np.median(run.chunk_seconds / run.chunk_steps)) if len(run.chunk_steps) else math.nan
     return HardCaseVerdict(
         case.name, world, verdict, "", found.energy_gain, found.energy_bound, residual,
         found.error, found.error_bound, int(run.impacts.rank.max(initial=0)), None,
         float(run.impacts.clamp.min(initial=1.0)), seconds, fault,
     )  # fmt: skip
+
+
+def _verdict(passive: bool, restored: bool, right: bool) -> str:
+    if not (passive and restored):
+        return "restitution unmet" if passive else "gains energy"
+    return STABLE if right else "wrong motion"
 
 
 def _verdict_of(error: IapbError) -> str:
@@ -251,23 +246,18 @@ def judge_impact(case: HardCase, method: str) -> HardCaseVerdict:
         """Return the verdict, the energy gain, the restitution residual and the distance from the truth."""
         gain = relative_energy_gain(case.mass_matrix, case.velocity, v_plus)
         residual, distance = _unmet(case, v_plus), _forward_error(case, v_plus)
-        if not gain <= energy_bound:
-            verdict = "gains energy"
-        elif not residual <= RESTITUTION_TOLERANCE:
-            verdict = "restitution unmet"
-        else:
-            verdict = "wrong motion" if case.well_posed and not distance <= forward_bound else "stable"
-        return verdict, gain, residual, distance
+        right = not case.well_posed or distance <= forward_bound
+        return _verdict(gain <= energy_bound, residual <= RESTITUTION_TOLERANCE, right), gain, residual, distance
 
     def is_seen(wrong: Floats, size: float) -> bool:
-        return measured(answer.velocity + size * wrong)[0] != "stable"
+        return measured(answer.velocity + size * wrong)[0] != STABLE
 
     (verdict, gain, residual, distance), fault = measured(answer.velocity), np.nan
     near = RESTITUTION_TOLERANCE / _NOISE <= residual <= RESTITUTION_TOLERANCE * _NOISE
     noise = verdict in ("gains energy", "restitution unmet") and distance > _ALL_NOISE
     if method in _THROUGH_LAPACK and (verdict != "gains energy" and near or noise):
         verdict = DEPENDS_ON_ROUNDING
-    if verdict == "stable":
+    if verdict == STABLE:
         fault = max(smallest_fault(partial(is_seen, wrong)) for wrong in faulty_answers(case, answer.velocity))
     return HardCaseVerdict(
         case.name, method, verdict, "", gain, energy_bound, residual, distance, forward_bound, answer.rank, truth.rank,
@@ -308,7 +298,7 @@ def resolve_once(case: HardCase, method: str) -> Answer:
     rank: int | None
     started, rank, clamp = time.perf_counter(), None, np.nan
     if isinstance(case, FrictionalCase) and method == NEWTON_COULOMB:
-        velocity, rank = np.array([float(x) for x in case.newton_with_coulomb()]), 1
+        velocity, rank = np.array([float(x) for x in case.impact.velocity(1)]), 1
     elif isinstance(case, FrictionalCase):
         rubbed = resolve_frictional_impact(*given[:2], case.tangent, case.velocity, float(given[3]), case.friction)
         velocity, rank, clamp = rubbed.velocity, 1, rubbed.clamp
@@ -395,7 +385,10 @@ def serve() -> None:
         sys.stdout.buffer.write(_READY)
         sys.stdout.buffer.flush()
         case, method, most_bytes = pickle.loads(sys.stdin.buffer.read())
-        _limit_memory(most_bytes)
+        if os.name == "posix":  # elsewhere only the time is limited
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))
         try:
             found: Any = resolve_once(case, method)
         except MemoryError:
@@ -403,11 +396,3 @@ def serve() -> None:
         except IapbError as error:
             found = IapbError(str(error))
     sys.stdout.buffer.write(pickle.dumps(found))
-
-
-def _limit_memory(most_bytes: int) -> None:
-    try:
-        import resource
-    except ImportError:  # not a POSIX system: only the time is limited
-        return
-    resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))

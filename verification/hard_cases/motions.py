@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-from iapb.scene import find_scene, load_scene, scene_from_text
-from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain, on_floor
+from iapb.scene import find_scene, load_scene
+from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, ball, largest_gain, on_floor
 
 # --- a ball that chatters --------------------------------------------------------------------------------------
 _HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
@@ -18,8 +17,8 @@ _HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
 # first bounce penetrates by one step, and the height between two instants has an error of one step, too.
 _STEPS_LATE = 4.0
 
-_BALL = {"name": "ball", "joint": "prismatic", "axis": [0, 1], "mass": 1.0, "position": [_RADIUS + _HEIGHT],
-         "shapes": [{"kind": "circle", "radius": _RADIUS}]}  # fmt: skip
+_FALL = math.sqrt(2.0 * _HEIGHT / _GRAVITY)  # [s] until the first bounce
+_END_OF_BOUNCES = _FALL * (1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION))  # [s], the sum of all flights
 _HARD = {"restitution": _RESTITUTION, "stiffness": 1e5, "damping": 200.0, "coherence_distance": 5e-3}
 
 
@@ -30,28 +29,22 @@ def chatter() -> TrajectoryCase:
         "the bounces accumulate: an event-driven method never passes that instant, and a time-stepping method may keep "
         "bouncing",
         "the parabolas as far as the time step resolves them, then rest",
-        f"parabolas of heights h e²ᵏ in closed form, at rest from {_end():.4f} s on",
-        on_floor("chatter", "A ball that chatters to rest", [_BALL], _HARD, duration=1.0), _measure_chatter,
+        f"parabolas of heights h e²ᵏ in closed form, at rest from {_END_OF_BOUNCES:.4f} s on",
+        on_floor("chatter", "A ball that chatters to rest", [ball("ball", _RADIUS, _RADIUS + _HEIGHT, axis=[0, 1])],
+                 _HARD, duration=1.0), _measure_chatter,
     )  # fmt: skip
 
 
 def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the height of the ball above the floor [m] by the closed form."""
-    fall = math.sqrt(2.0 * _HEIGHT / _GRAVITY)
-    height = np.where(time < fall, _HEIGHT - 0.5 * _GRAVITY * time**2, 0.0)
-    start, speed = fall, _GRAVITY * fall * _RESTITUTION
+    height = np.where(time < _FALL, _HEIGHT - 0.5 * _GRAVITY * time**2, 0.0)
+    start, speed = _FALL, _GRAVITY * _FALL * _RESTITUTION
     while speed * speed / (2.0 * _GRAVITY) > np.finfo(float).eps * _HEIGHT:
         flown = time - start
         height = np.where((flown >= 0.0) & (flown < 2.0 * speed / _GRAVITY),
                           speed * flown - 0.5 * _GRAVITY * flown**2, height)  # fmt: skip
         start, speed = start + 2.0 * speed / _GRAVITY, speed * _RESTITUTION
     return np.asarray(height, np.float64)
-
-
-def _end() -> float:
-    """Return the time at which the bounces end [s], the sum of the geometric series of flight times."""
-    fall = math.sqrt(2.0 * _HEIGHT / _GRAVITY)
-    return fall * (1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION))
 
 
 def _measure_chatter(run: Run) -> Measured:
@@ -158,13 +151,10 @@ def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
     up to 2 K Δt²/m, which is 0.21 % here, as the world PB shows.
     """
     places = [-0.021875 - 2.0 * radius] + [k * (2.0 * radius + gap) for k in range(4)]
-    balls = [{"name": f"ball_{k}", "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "position": [x],
-              "velocity": [float(k == 0)], "shapes": [{"kind": "circle", "radius": radius}]}
-             for k, x in enumerate(places)]  # fmt: skip
-    contact = {"forces": "paper", "stiffness": _CRADLE_STIFFNESS, "damping": 0.0, "restitution": 1.0,
-               "coherence_distance": 2e-3}  # fmt: skip
-    scene = {"name": "touching_cradle", "title": "Newton's cradle whose balls touch", "source": "textbook",
-             "rate": 1000, "duration": 0.3, "bodies": balls, "contact": contact}  # fmt: skip
+    balls = [ball(f"ball_{k}", radius, x, velocity=[float(k == 0)]) for k, x in enumerate(places)]
+    contact = {"stiffness": _CRADLE_STIFFNESS, "damping": 0.0, "restitution": 1.0, "coherence_distance": 2e-3}
+    scene = on_floor("touching_cradle", "Newton's cradle whose balls touch", balls, contact, duration=0.3, gravity=None,
+                     walls=[])
 
     def measure(run: Run) -> Measured:
         """Measure the relative error of momentum and energy at the end; both must equal those of the first ball."""
@@ -179,5 +169,5 @@ def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
         "the outcome depends on which contacts collide: impulses or springs transmit the momentum",
         "momentum is conserved and no energy created, whichever ball leaves",
         "momentum and energy of five equal elastic balls: Σ v = 1 and Σ v² = 1",
-        scene_from_text(json.dumps(scene)), measure,
+        scene, measure,
     )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from verification.hard_cases.case import HardCase
+from verification.hard_cases.case import Floats, HardCase
 
 
 def thousand_copies() -> HardCase:
@@ -33,10 +33,8 @@ def contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
 
 def printed_formula_gains() -> HardCase:
     """An elastic impact at rows that differ by 1e-4, with a mass matrix of condition number 1e6."""
-    rng = np.random.default_rng(7)
-    d = 6
-    axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
-    mass = axes * np.logspace(0.0, -6.0, d) @ axes.T
+    rng, d = np.random.default_rng(7), 6
+    mass, _ = _mass(rng, d, 6.0)
     base = rng.normal(size=(2, d))
     rows = np.vstack([base, base + 1e-4 * rng.normal(size=(2, d)), base + 1e-4 * rng.normal(size=(2, d))])
     return HardCase(
@@ -44,8 +42,15 @@ def printed_formula_gains() -> HardCase:
         "erratum 6 of the paper; normal equations: Higham, Accuracy and Stability (2002)",
         "W has condition 1e8 from the rows and 1e6 from M: its small singular values are noise",
         "no gain; the printed formula inverts noise",
-        0.5 * (mass + mass.T), rows, rng.normal(size=d), 1.0,
+        mass, rows, rng.normal(size=d), 1.0,
     )  # fmt: skip
+
+
+def _mass(rng: np.random.Generator, d: int, decades: float) -> tuple[Floats, Floats]:
+    """Return M with eigenvalues over these decades, and its axes."""
+    axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
+    mass = axes * np.logspace(0.0, -decades, d) @ axes.T
+    return 0.5 * (mass + mass.T), axes
 
 
 def hilbert_rows() -> HardCase:
@@ -76,11 +81,8 @@ def kahan_rows() -> HardCase:
 
 def light_direction() -> HardCase:
     """An elastic impact with v along M's lightest direction, κ(M) = 1e12 and random rows in the kinetic metric."""
-    rng = np.random.default_rng(34)
-    d = 6
-    axes = np.linalg.qr(rng.normal(size=(d, d)))[0]
-    mass = axes * np.logspace(0.0, -12.0, d) @ axes.T
-    mass = 0.5 * (mass + mass.T)
+    rng, d = np.random.default_rng(34), 6
+    mass, axes = _mass(rng, d, 12.0)
     rows = rng.normal(size=(3, d)) @ np.linalg.cholesky(mass).T
     return HardCase(
         "Velocity along M's lightest direction, κ(M) = 1e12",

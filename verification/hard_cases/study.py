@@ -20,11 +20,10 @@ from verification.finding import (
     verdict_of_trials,
 )
 from verification.hard_cases import judge
-from verification.hard_cases.case import CaseAbsent, TrajectoryCase
+from verification.hard_cases.case import STABLE, CaseAbsent, TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.table import Row, Table
 
-STABLE = "stable"
 ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
 _NOTES = {
     "impact": "Stable: gain at most 10 d ε √κ(M), restitution residual at most 1e-8, error at most the error allowed. "
@@ -53,7 +52,8 @@ def hard_cases(
 def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) -> Finding:
     """Return the finding on the engine; its table has every method and world on every case."""
     tried = [case for case in cases if case.computed]
-    ours = {case.title: _outcome(case) for case in tried}
+    by = {case.title: {part.name: part.sentence for part in case.parts} for case in tried}
+    ours = {title: next((found[name] for name in ENGINE if name in found), "") for title, found in by.items()}
     failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
     skipped = len(cases) - len(tried)
     stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
@@ -69,12 +69,6 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     parts = (Part(sentence, verdict, miss="".join(failing[:1]) + others, quantities=(stable,)),)
     tables = {EVERY_METHOD.key: table.without("note") if rows else table}
     return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures, (stable,))
-
-
-def _outcome(case: Finding) -> str:
-    """Return the outcome of the engine on a case; "" if it was not judged on this case."""
-    by = {part.name: part.sentence for part in case.parts}
-    return next((by[name] for name in ENGINE if name in by), "")
 
 
 def _judged(study: Study, name: str) -> Finding:
