@@ -27,7 +27,7 @@ from reports.pages.terms import TERMS, explained, readable, terms_of
 from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
 from tests.reports.joined import joined
 from verification.claims import CLAIMS
-from verification.claims.conditions import full_grid
+from verification.claims.conditions import FULL_GRID
 from verification.claims.peg import FULL, LARGE
 from verification.finding import (
     MIXED,
@@ -251,7 +251,7 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     claim = CLAIMS["C10"]
     near, far = {"IAPB": 1e-5, "PB": 1e-4, "CBuc": 1e-4}, {"IAPB": 1e-3, "PB": 1e-4, "CBuc": 1e-4}
     rows = [start.row() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "threshold": FULL}
-            for start in full_grid()]  # fmt: skip
+            for start in FULL_GRID]  # fmt: skip
     found = claim.conclude(claim.table_of(rows))
     pile = dict.fromkeys(("contacts", "redundant", "time of (21)", "time of pushing"), 10.0)
     piles = [pile | {"rows": "touching", "most contacts that agree": 14, "contacts": contacts,

@@ -100,14 +100,9 @@ def start_conditions(depth: str) -> tuple[Condition, ...]:
     return tuple(dict.fromkeys(grid + travels + frictions + approaches))
 
 
-def full_grid() -> tuple[Condition, ...]:
-    """Return every tilt and clearance of the full depth, at the paper's approach velocity."""
-    return tuple(Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"])
-
-
-def even_grid() -> tuple[Condition, ...]:
-    """Return the starts of the full grid whose tilts are evenly spaced."""
-    return tuple(start for start in full_grid() if start.tilt in EVEN_TILTS)
+# Every tilt and clearance of the full depth, at the paper's approach velocity, and those with evenly spaced tilts.
+FULL_GRID = tuple(Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"])
+EVEN_GRID = tuple(start for start in FULL_GRID if start.tilt in EVEN_TILTS)
 
 
 def limited_conditions(depth: str) -> tuple[Condition, ...]:

@@ -11,12 +11,12 @@ import numpy as np
 from iapb.scene import Scene
 from verification.check import Check, Study
 from verification.claims.conditions import (
+    EVEN_GRID,
+    FULL_GRID,
     START,
     UNITS,
     Condition,
     drawn,
-    even_grid,
-    full_grid,
     limited_conditions,
     start_conditions,
 )
@@ -117,14 +117,14 @@ FULL, EVEN = f"{PAPERS}, full grid", f"{PAPERS}, evenly spaced tilts"
 
 
 def _all_starts(study: Study) -> tuple[Condition, ...]:
-    return tuple(dict.fromkeys((*start_conditions(study.depth), *full_grid(), *even_grid())))
+    return tuple(dict.fromkeys((*start_conditions(study.depth), *FULL_GRID, *EVEN_GRID)))
 
 
 def _trajectory(study: Study, condition: Condition) -> Iterator[Row]:
     """Yield one row per coordinate and group of a start; a fresh start belongs to all groups of its threshold."""
     groups = [LARGER]
     if condition.approach_velocity == Condition().approach_velocity:
-        members = {PAPERS: start_conditions(study.depth), FULL: full_grid(), EVEN: even_grid()}
+        members = {PAPERS: start_conditions(study.depth), FULL: FULL_GRID, EVEN: EVEN_GRID}
         groups = [name for name, starts in members.items() if condition in starts] or list(members)
     for row in _distances(study, condition, "full"):
         yield from (condition.row() | row | {"threshold": group} for group in groups)
