@@ -74,11 +74,10 @@ def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) ->
     record = {"law": found.law, "resolver": request.resolver, "value": found.residual.value,
               "tolerance": found.residual.tolerance, "part": found.part, "index": found.index, "request": request,
               "case": found.case, "test": ""}  # fmt: skip
-    if (struck := found.struck) is not None:
-        case, subject, law = struck.case, request.subject(), (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law]
+    if found.struck is not None:
+        case, subject, law = found.case, request.subject(), (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law]
         record |= {"resolver": ENGINE if found.law in ENGINE_LAWS else request.resolver, "statement": law.statement,
-                   "rows": struck.rows, "velocity_after": struck.velocity_after, "complaint": struck.complaint,
-                   "test": as_test(case, found.law, subject.bounds, subject.resolver)}  # fmt: skip
+                   **found.struck, "test": as_test(case, found.law, subject.bounds, subject.resolver)}  # fmt: skip
         e, fclib = case.given_restitution(), path.with_suffix(".hdf5")
         if case.contacts and np.min(e) >= 0.0:
             try:

@@ -18,7 +18,7 @@ from iapb.run import Run
 from reference.one_thread import one_thread
 from verification.impacts import draw_case, with_unequal_restitution
 from verification.laws.bounds import Bounds, LawCount, LawResidual
-from verification.laws.counterexample import Struck, strike
+from verification.laws.counterexample import strike
 from verification.laws.engine import ENGINE_LAWS
 from verification.laws.equality import LAWS, OF_ONE_CALL, UNEQUAL_LAWS
 from verification.laws.kit import residual_of
@@ -63,7 +63,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Found:
-    """A counterexample: the broken law, the part and index, the case, and the run of a scene or the resolved impact."""
+    """A counterexample: the law, the part and index, the case, and the run of a scene or what `strike` returns."""
 
     law: str
     part: str
@@ -71,7 +71,7 @@ class Found:
     residual: LawResidual
     case: Any
     run: Run | None = None
-    struck: Struck | None = None
+    struck: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from verification.impacts import Floats, ImpactCase
+from verification.impacts import ImpactCase
 from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS
 from verification.laws.engine import ENGINE_LAWS, budgets
@@ -149,24 +149,11 @@ def _written(array: np.ndarray) -> str:
     return text if array.size else f"{text}.reshape({array.shape})"
 
 
-# A resolver's answers to one impact, as plain numbers, so that readers of a counterexample need not call the resolver.
-@dataclass(frozen=True)
-class Struck:
-    """An impact and the velocity after it: one velocity, or one for each row budget that the law tries.
+def strike(part: str, case: Any, resolver: Resolver) -> dict[str, Any] | None:
+    """Return the velocities after an impact, by `resolver` or, in the parts of ENGINE_LAWS, by the engine.
 
-    rows : (k,) number of rows that the resolver may use.
-    velocity_after : (k, d), NaN if the resolver gave no finite velocity; `complaint` gives the reason.
-    """
-
-    case: ImpactCase
-    rows: tuple[int, ...]
-    velocity_after: Floats
-    complaint: str = ""
-
-
-def strike(part: str, case: Any, resolver: Resolver) -> Struck | None:
-    """Resolve a case of a part by `resolver` or, in the parts of ENGINE_LAWS, by the engine.
-
+    `velocity_after` (k, d) has one velocity, or one for each row budget that the law tries; `rows` (k,) are the rows
+    that the resolver may use. A velocity is NaN if the resolver gave no finite one; `complaint` gives the reason.
     Returns None if the case is not an impact, such as a wall in the hand, two rooms, or a device with force limits.
     """
     if not isinstance(case, ImpactCase):
@@ -180,4 +167,4 @@ def strike(part: str, case: Any, resolver: Resolver) -> Struck | None:
                            else own_outcome(subject, case))  # fmt: skip
         except ResolverFault as fault:
             complaints.append(str(fault))
-    return Struck(case, rows, after, "; ".join(complaints))
+    return {"rows": rows, "velocity_after": after, "complaint": "; ".join(complaints)}
