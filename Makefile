@@ -49,8 +49,7 @@ verify: setup ## the laws at 1,000,000 impacts and 7,000 trajectories; half an h
 
 .PHONY: portable
 portable: setup ## tests, runs and report under other BLAS kernels, numpy, libm and threads; SETTINGS="Haswell Zen" selects
-	@$(BIN)/python -m tools.portable $(if $(PORTABLE_ARGS),$(PORTABLE_ARGS),--reproduce) --workers $(PYTEST_WORKERS) \
-		$(if $(SETTINGS),--settings $(SETTINGS))
+	@$(BIN)/python -m tools.portable $(PORTABLE_ARGS) --workers $(PYTEST_WORKERS) $(if $(SETTINGS),--settings $(SETTINGS))
 
 .PHONY: fuzz
 fuzz: setup ## faults done to the store, and 90,000 wrong inputs: each is read or refused by name; TIMES=60 of what tests try

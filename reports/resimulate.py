@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,17 @@ import numpy as np
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.names import one_of
+from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.model import scene_kind
-from iapb.simulation import simulate
+from iapb.simulation import Simulation, simulate
 from iapb.worlds import find_world
+from reports.store.folder import Place
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
-from reports.store.runs import read_run
+from reports.store.parts import read_head
+from reports.store.runs import read_run, store_run
+from reports.streaming import joined
 
 # name of a law -> (module, class); any other law is taken from the world that has it
 LAWS = {
@@ -139,3 +144,26 @@ def _changes(name: str, stored: np.ndarray, again: np.ndarray) -> Iterator[Chang
             return
         largest = float(np.max(np.nan_to_num(np.abs(a[~bits] - b[~bits]), nan=np.inf)))
         yield Change(name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest)
+
+
+def recover(folder: Path) -> Path:
+    """Store the steps in parts as a partial run beside them, so that they can be read; the parts stay for resuming.
+
+    Raises
+    ------
+    RunFileError
+        The parts are damaged.
+    ArgumentError
+        The law or coupling is not one of the project's.
+    """
+    head = read_head(folder)
+    place = Place(str(head.get("key", "")), folder.with_suffix(""))
+    pieces = joined(folder, Recorder(simulation_of(head)), str(head["world"]))
+    store_run(place.partial, pieces, key=place.key, stopped="killed", replace=True)
+    return place.partial
+
+
+def simulation_of(head: Mapping[str, Any]) -> Simulation:
+    """Return the simulation of parts in its initial state."""
+    run: Any = SimpleNamespace(**head)  # it has the names of a Run's
+    return Simulation(scene_of(run), law_of(run), coupling_of(run))

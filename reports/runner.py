@@ -19,7 +19,7 @@ from reports.store.folder import Place, RunStore
 from reports.store.io import mark_store
 from reports.store.runs import RunEntry, read_provenance
 from reports.streaming import Stream
-from reports.uses import UsedRun, add_use, run_command
+from reports.uses import UsedRun, run_command
 
 Progress = Callable[[int, int], None]
 Fetched = tuple[Run, RunEntry]
@@ -38,7 +38,7 @@ class Runner:
         self.store = RunStore(folder)
         self.progress = progress
         self.used: dict[str, UsedRun] = {}  # by file name, in the order of use
-        self._outside: list[dict[str, UsedRun]] = []  # the used runs from outside of each open `recording`
+        self.files: set[str] = set()  # of all runs used so far, inside and outside of an open `recording`
         self.user = ""  # the user recorded for the runs requested now
         self._held: dict[str, Fetched] = {}
         self._known: dict[str, UsedRun] = {}
@@ -99,23 +99,23 @@ class Runner:
         outside, user_outside = self.used, self.user
         inside: dict[str, UsedRun] = {}
         self.used, self.user = inside, user
-        self._outside.append(outside)
         try:
             yield inside
         finally:
-            self._outside.pop()
             self.used, self.user = outside, user_outside
             for run in inside.values():
-                add_use(outside, run)
+                self.use(run)
 
-    def used_so_far(self) -> list[str]:
-        """Return the sorted names of all run files used so far, inside and outside of an open `recording`."""
-        return sorted({file for used in (*self._outside, self.used) for file in used})
+    def use(self, run: UsedRun) -> None:
+        """Record a run as used; its earlier users are kept."""
+        before = self.used[run.file].used_by if run.file in self.used else ()
+        self.used[run.file] = replace(run, used_by=tuple(dict.fromkeys(before + run.used_by)))
+        self.files.add(run.file)
 
     def use_again(self, scene: Scene, world: str, rendering: str = "full") -> None:
         """Record that the current user also uses a run, if it was requested before."""
         if known := self._known.get(self.file_of(scene, world, rendering)):
-            add_use(self.used, replace(known, used_by=(self.user,) if self.user else ()))
+            self.use(replace(known, used_by=(self.user,) if self.user else ()))
 
     def file_of(self, scene: Scene, world: str, rendering: str = "full") -> str:
         """Return the name of the file of a run."""

@@ -8,16 +8,14 @@ work are lost.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from iapb.errors import RunFileError
 from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.simulation import Simulation, record
-from reports.resimulate import coupling_of, law_of, scene_of
 from reports.store.folder import Place
 from reports.store.keys import code_label, plain
 from reports.store.parts import Parts, parts_of, read_head, read_parts, remove_parts
@@ -151,26 +149,3 @@ def joined(folder: Path, recorder: Recorder, world: str, steps: int = 0,
     if recorder.steps < max(steps, 1):
         raise RunFileError(f"{folder}: damaged: only {recorder.steps} of {max(steps, 1)} steps can be read")
     yield recorder.take(world)
-
-
-def recover(folder: Path) -> Path:
-    """Store the steps in parts as a partial run beside them, so that they can be read; the parts stay for resuming.
-
-    Raises
-    ------
-    RunFileError
-        The parts are damaged.
-    ArgumentError
-        The law or coupling is not one of the project's.
-    """
-    head = read_head(folder)
-    place = Place(str(head.get("key", "")), folder.with_suffix(""))
-    pieces = joined(folder, Recorder(simulation_of(head)), str(head["world"]))
-    store_run(place.partial, pieces, key=place.key, stopped="killed", replace=True)
-    return place.partial
-
-
-def simulation_of(head: Mapping[str, Any]) -> Simulation:
-    """Return the simulation of parts in its initial state."""
-    run: Any = SimpleNamespace(**head)  # it has the names of a Run's
-    return Simulation(scene_of(run), law_of(run), coupling_of(run))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Iterator, Mapping, MutableMapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -41,12 +41,6 @@ class UsedRun:
     status: str = COMPLETE
     used_by: tuple[str, ...] = ()
     made_on: str = ""
-
-
-def add_use(used: MutableMapping[str, UsedRun], run: UsedRun) -> None:
-    """Add a run to the used runs, by file; its earlier users are kept."""
-    before = used[run.file].used_by if run.file in used else ()
-    used[run.file] = replace(run, used_by=tuple(dict.fromkeys(before + run.used_by)))
 
 
 def run_command(scene: Scene, world: str, rendering: str = "full") -> str:

@@ -23,14 +23,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
+from reports.provenance import uncommitted_changes
 from reports.show import table_text
+from reports.store.keys import hash_of, results_of
 from verification.table import titled
 
 ROOT = Path.cwd()
@@ -42,7 +43,7 @@ TESTS = ("tests/iapb", "tests/reference", "tests/verification", "tests/reports",
 # verdict is a penetration of 1e-4 m, ten thousand times as large as the tolerance.
 Q_TOLERANCE = 1e-8
 JUDGED = ("outcome", "holds", "law")  # columns with verdicts: of findings and cases, of single trials, of other engines
-IMPACTS = 200
+IMPACTS, Q = 200, "trajectory/q"
 BLAS = {name: {"OPENBLAS_CORETYPE": name} for name in ("Haswell", "SkylakeX", "Sandybridge", "Zen", "Prescott")}
 SETTINGS: dict[str, dict[str, str]] = {
     "default": {},
@@ -62,10 +63,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.portable", description=__doc__.splitlines()[0])
     parser.add_argument("--settings", nargs="+", choices=SETTINGS, default=list(SETTINGS), metavar="NAME",
                         help=f"default: all of {', '.join(SETTINGS)}")  # fmt: skip
-    only = parser.add_mutually_exclusive_group()
-    only.add_argument("--tests-only", action="store_true", help="only the numerical tests")
-    only.add_argument("--runs-only", action="store_true", help="only the runs and impacts: a minute a setting")
-    parser.add_argument("--reproduce", action="store_true", help="also a quick `iapb reproduce`: ten minutes a setting")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS),
+                        help="default: tests runs report; a setting takes minutes, a minute, and ten minutes")
     parser.add_argument("--out", type=Path, default=Path("out/portable"))
     parser.add_argument("--workers", default="2", help="processes of pytest")
     parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
@@ -73,30 +72,17 @@ def main() -> int:
     if given.child:
         CHILDREN[given.child[0]](Path(given.child[1]))
         return 0
-    parts = [name for name, wanted in (("tests", not given.runs_only), ("runs", not given.tests_only),
-                                       ("report", given.reproduce)) if wanted]  # fmt: skip
-    names = given.settings if parts == ["tests"] else list(dict.fromkeys(["default", *given.settings]))
+    names = given.settings if given.parts == ["tests"] else list(dict.fromkeys(["default", *given.settings]))
     folder = given.out.resolve() / state_of_sources()
-    rows = [row for name in names if (row := try_setting(name, folder, parts, given.workers))]
-    text = table(rows)
-    print(text)
-    (given.out / "portable.txt").write_text(text + "\n", encoding="utf-8")
-    (given.out / "portable.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    rows = [row for name in names if (row := try_setting(name, folder, given.parts, given.workers))]
+    print(table(rows))
     return int(any(row["wrong"] for row in rows) or all("not tried" in row for row in rows))
 
 
 def state_of_sources() -> str:
     """Return the commit, the version of Python, and a hash of uncommitted changes."""
-    commit = _git("rev-parse", "--short=12", "HEAD")
-    untracked = _git("ls-files", "--others", "--exclude-standard")
-    changed = _git("diff", "HEAD") + untracked
-    changed += "".join(f"{(ROOT / name).read_bytes()!r}" for name in untracked.splitlines())
-    python = f"-py{sys.version_info[0]}.{sys.version_info[1]}"
-    return commit + python + (f"-{hashlib.sha256(changed.encode()).hexdigest()[:8]}" if changed else "")
-
-
-def _git(*arguments: str) -> str:
-    return subprocess.run(["git", *arguments], capture_output=True, text=True, check=True, cwd=ROOT).stdout.strip()
+    commit = subprocess.run(["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True)
+    return f"{commit.stdout.strip()}-py3.{sys.version_info[1]}-{hash_of(uncommitted_changes())[:8]}"
 
 
 def try_setting(name: str, folder: Path, parts: list[str], workers: str) -> dict[str, Any]:
@@ -105,7 +91,7 @@ def try_setting(name: str, folder: Path, parts: list[str], workers: str) -> dict
     here.mkdir(parents=True, exist_ok=True)
     machine = _facts({}, here / "machine.json")
     setting, reason = environment(name, machine, here)
-    row: dict[str, Any] = {"setting": name, "environment": setting, "wrong": []}
+    row: dict[str, Any] = {"setting": name, "wrong": []}
     if reason:
         return row | {"not tried": reason}
     row["facts"] = facts = _facts(setting, here / "facts.json")
@@ -212,21 +198,18 @@ def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> 
 
 def _differences(first: Path, second: Path) -> tuple[float, float]:
     """Return the largest difference of q and of any array; infinite if the two files have different entries."""
-    if not (first.is_file() and second.is_file()):
-        return np.inf, np.inf  # one of them was not computed
-    q, largest = 0.0, 0.0
+    gaps = {Q: 0.0}
     with np.load(first) as old, np.load(second) as new:
-        texts = [key for key in old.files if old[key].dtype.kind == "U"]
-        if set(old.files) != set(new.files) or any(old[key] != new[key] for key in texts):
-            return np.inf, np.inf  # one of them was refused, or says something else
-        for key in (key for key in old.files if old[key].dtype.kind in "fiu"):
-            gap = np.inf
-            if old[key].shape == new[key].shape:
-                other = ~((old[key] == new[key]) | (np.isnan(old[key]) & np.isnan(new[key])))
-                gap = np.max(np.abs(old[key][other].astype(float) - new[key][other]), initial=0.0)
-                gap = np.inf if np.isnan(gap) else gap
-            largest, q = max(largest, gap), (max(q, gap) if key == "q" else q)
-    return float(q), float(largest)
+        if old.files != new.files or any(old[key].shape != new[key].shape for key in old.files):
+            return np.inf, np.inf
+        for key in old.files:
+            if old[key].dtype.kind in "fiu":
+                a, b = old[key].astype(float), new[key].astype(float)
+                gaps[key] = float(np.max(np.nan_to_num(np.abs(a - b)[~((a == b) | (np.isnan(a) & np.isnan(b)))],
+                                                       nan=np.inf), initial=0.0))  # fmt: skip
+            elif old[key].dtype.kind == "U" and old[key] != new[key]:
+                return np.inf, np.inf  # one of them was refused, or says something else
+    return gaps[Q], max(gaps.values())
 
 
 def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -> dict[str, Any]:
@@ -305,23 +288,11 @@ def _runs() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
         for world, rendering in [*((world, "full") for world in WORLDS), *renderings]:
             kind = "engine" if type(find_world(world).law).__module__.startswith("iapb.") else "other"
             try:
-                arrays = list(_arrays("", run_world(scene, world, rendering, partial=True)))
+                run = run_world(scene, world, rendering, partial=True)
+                arrays = [("distrust", np.array("; ".join(run.distrust))), *results_of(run)]
             except IapbError as refused:
                 arrays = [("refused", np.array(str(refused)))]
             yield f"{name}-{world}-{rendering}", kind, arrays
-
-
-def _arrays(place: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield every array of a record with its place, without measured times."""
-    if is_dataclass(value):
-        for field in fields(value):
-            if not field.name.startswith("chunk_"):
-                yield from _arrays(f"{place}.{field.name}".strip("."), getattr(value, field.name))
-    elif isinstance(value, dict):
-        for key in value:
-            yield from _arrays(f"{place}.{key}", value[key])
-    elif isinstance(value, np.ndarray | float | int | str):
-        yield place, np.asarray(value)
 
 
 def _impacts() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
@@ -337,7 +308,8 @@ def _impacts() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
         rows = (rng.integers(-3, 4, size=(c, rank)) @ rng.integers(-9, 10, size=(rank, d))).astype(float)
         e = rng.integers(0, 9) / 8.0 if number % 4 else rng.integers(0, 9, size=c) / 8.0
         impact = resolve_impact(mass, rows, rng.integers(-99, 100, size=d) / 64.0, e)
-        yield f"impact-{number}", "engine", list(_arrays("", impact))
+        yield f"impact-{number}", "engine", [(key, np.asarray(value)) for key, value in impact._asdict().items()
+                                             if isinstance(value, np.ndarray | float | int | tuple)]  # fmt: skip
 
 
 CHILDREN = {"facts": child_facts, "runs": child_runs}

@@ -58,10 +58,10 @@ def live(
         try:
             rows = calibrated(simulation, simulation.system.dt) if budget else None
             with closing(Viewer(simulation, port)) if view else nullcontext() as viewer:
-                loop = Loop(simulation, ticks, budget=rows, audience=viewer, parts=parts)
+                loop = Loop(simulation, ticks, parts, budget=rows, audience=viewer)
                 under_way = f"See it, and drag the handle, at {viewer.start()}" if viewer else "Under way"
                 print(f"{under_way} for {length}", file=sys.stderr if json_ else sys.stdout, flush=True)
-                stopped = loop.stream()
+                stopped = loop.run()
             run, timetable, pace = finish_live(parts.folder, stopped, parts.steps)
         except BaseException:
             parts.close(remove=parts.steps == 0)

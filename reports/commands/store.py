@@ -14,7 +14,7 @@ import typer
 from iapb.errors import ArgumentError, IapbError
 from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
-from reports.resimulate import repeat_run
+from reports.resimulate import recover, repeat_run
 from reports.show import Answer, Json, stage_progress
 from reports.store.care import (
     DAMAGED,
@@ -30,7 +30,6 @@ from reports.store.care import (
 )
 from reports.store.parts import are_damaged, remove_parts
 from reports.store.runs import read_provenance
-from reports.streaming import recover
 
 
 class Action(StrEnum):

@@ -23,7 +23,7 @@ from reports.provenance import PEERS, collect_provenance, this_machine
 from reports.runner import Runner
 from reports.store.io import opened
 from reports.store.keys import evidence_version
-from reports.uses import UsedRun, add_use
+from reports.uses import UsedRun
 from verification import haptic_rate
 from verification.cost import effects
 from verification.finding import Failure, Finding, attempt
@@ -104,7 +104,7 @@ def _fill(stage: Stage, runner: Runner, depth: str, progress: Progress) -> Stage
         stage.fill(runner, lambda failures: plan.compute(runner, depth, said, failures))
         said(1, 1)
     for run in stage.runs.values():
-        add_use(runner.used, run)
+        runner.use(run)
     return stage
 
 

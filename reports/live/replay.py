@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,16 +14,23 @@ from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.simulation import Simulation
 from reports.live.deadline import TICK, Pace, Tally, Timetable
-from reports.live.loop import LiveRun, Tape, name_of
 from reports.provenance import collect_provenance
-from reports.resimulate import coupling_of, law_of, scene_of
+from reports.resimulate import coupling_of, law_of, scene_of, simulation_of
 from reports.store.io import mark_store, new_file
 from reports.store.parts import Parts, parts_of, read_head
 from reports.store.runs import read_run, store_run
 from reports.store.tables import append_columns, read_columns, write_head
-from reports.streaming import joined, parts_head, simulation_of
+from reports.streaming import joined, parts_head
 
 _COMPILED = "compiled"
+
+
+class LiveRun(NamedTuple):
+    """A run in real time, and its timetable; `device` is the class of its device, empty = the compiled device."""
+
+    run: Run
+    timetable: Timetable
+    device: str = ""
 
 
 def _timetable_of(run: Path) -> Path:
@@ -34,7 +41,9 @@ def open_parts(folder: Path, name: str, simulation: Simulation, world: str, tick
     """Return the parts of a live run that will become ``name.h5``; mark the folder as a store, so that repair works."""
     mark_store(folder)
     start = {name: values.tolist() for name, values in Recorder(simulation).start.items()}
-    more = {"device": name_of(simulation.link), "period": simulation.system.dt, "start": start}
+    device = type(simulation.link.device) if simulation.link else None
+    told = f"{device.__module__}:{device.__qualname__}" if device else ""
+    more = {"device": told, "period": simulation.system.dt, "start": start}
     return Parts(parts_of(folder / f"{name}.h5"), parts_head(simulation, world, ticks, live=more), synced=False)
 
 
@@ -123,11 +132,15 @@ def replay(live: LiveRun) -> Run:
     run, timetable = live.run, live.timetable
     device = RecordedDevice(run) if live.device else None
     simulation = Simulation(scene_of(run), law_of(run), coupling_of(run), device)
-    tape = Tape(simulation, run.steps)
-    for row in timetable.rows:
-        tape.tick()[:] = row
-        simulation.state.row_budget[0], simulation.port.wrench[:] = row[3], row[4:]
-        simulation.begin_step()
-        simulation.end_step()
-        tape.write()
-    return tape.run(run.world, run.stopped).run
+    recorder = Recorder(simulation)
+    while recorder.steps < run.steps:
+        record, size = recorder.blank(run.steps)
+        if not recorder.steps:
+            simulation.prepare(record, singly=True)
+        for line, row in enumerate(timetable.rows[recorder.steps:][:size]):
+            simulation.state.row_budget[0], simulation.port.wrench[:] = row[3], row[4:]
+            simulation.begin_step()
+            simulation.end_step()
+            simulation.write(record, line)
+        recorder.keep(record, size, 0.0)
+    return recorder.run(run.world, run.stopped)

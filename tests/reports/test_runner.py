@@ -88,4 +88,4 @@ def test_every_engine_run_used_before_is_certified(tmp_path, monkeypatch):
         found = exact_energy.TOPIC(runner, "quick", lambda done, total: None)
     table = found.tables["certified runs"]
     assert table.column("impacts") == [len(run.impacts.step)] and len(run.impacts.step) > 0
-    assert not inside and len(runner.used_so_far()) == 2
+    assert not inside and len(runner.files) == 2

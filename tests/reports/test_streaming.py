@@ -14,12 +14,12 @@ from iapb.errors import RunFileError
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import INTERRUPTED
 from reference.worlds import run_world
+from reports.resimulate import recover
 from reports.runner import Runner
 from reports.store.care import LEFTOVER, PARTIAL, check_store, garbage, parts_of_killed
 from reports.store.keys import content_hash
 from reports.store.parts import Parts, PartsLocked, parts_of, read_parts
 from reports.store.runs import opened_run, read_entry, read_run
-from reports.streaming import recover
 
 # planar with impacts and a device; a tool that is carried; space, contacts and no device; a law in Python
 CASES = [("peg_corner", "IAPB", 3000), ("peg_corner", "CBuc", 2500), ("arm_obstacles", "PB", 1200),

@@ -37,13 +37,14 @@ from reports.cli import main
 from reports.commands.inspect import inspect
 from reports.live.deadline import TICK_COLUMNS
 from reports.live.replay import finish_live, is_live, open_parts
+from reports.resimulate import recover
 from reports.store.folder import Place
 from reports.store.io import sealed
 from reports.store.keys import content_hash
 from reports.store.parts import Parts
 from reports.store.runs import read_entry
 from reports.store.tables import read_table, write_table
-from reports.streaming import Stream, parts_head, recover
+from reports.streaming import Stream, parts_head
 from reports.sweeps.study import load_study, points_of, scene_of
 from tests.robustness.damage import TOKENS, Rng, changes, chosen, damaged_bytes, damaged_text, damaged_values
 from tests.robustness.faults import put

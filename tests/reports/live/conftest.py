@@ -7,6 +7,8 @@ import pytest
 from iapb.scene import find_scene, load_scene
 from reference.worlds import find_world
 from reports.live.device import live_simulation
+from reports.live.loop import Loop
+from reports.live.replay import finish_live, open_parts, read_live
 
 # A tilted peg near the corner, fast: a collision of several contacts within the first hundredths of a second.
 VALUES = {"bodies.peg.position": [0.0209, -0.0141, 0.08], "bodies.peg.velocity": [-0.3, 0.4, 0.0]}
@@ -43,3 +45,16 @@ def peg():
         return live_simulation(scene, find_world(world), RATE, device)
 
     return made
+
+
+@pytest.fixture
+def lived(tmp_path):
+    """Run a loop, and read the files that it comes to: lived(simulation, ticks, clock, budget=None, audience=None)."""
+    def ran(simulation, ticks, *given, **options):
+        parts = open_parts(tmp_path, "live", simulation, "IAPB", ticks)
+        stopped = Loop(simulation, ticks, parts, *given, **options).run()
+        path, _, pace = finish_live(parts.folder, stopped, parts.steps)
+        parts.close(remove=True)
+        return read_live(path), pace
+
+    return ran

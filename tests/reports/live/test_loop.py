@@ -11,7 +11,7 @@ import pytest
 from reference.worlds import run_world
 from reports.cli import main
 from reports.live.budget import RowBudget, calibrated
-from reports.live.deadline import PERCENTILES, Tally
+from reports.live.deadline import PERCENTILES
 from reports.live.loop import Loop
 from reports.live.replay import finish_live, is_live, open_parts, read_live, replay
 from reports.store.care import parts_of_killed
@@ -22,17 +22,12 @@ PERIOD = 1e-3
 TICKS = 700  # more than one chunk of the record
 
 
-def summary(live):
-    """How a live run kept its rate."""
-    tally = Tally()
-    tally.add(live.run, live.timetable)
-    return tally.pace()
-
-
-def test_a_miss_delays_what_comes_after_by_what_it_was_late_and_changes_nothing_in_the_run(peg, fake_clock):
+def test_a_miss_delays_what_comes_after_and_changes_nothing_in_the_run(peg, fake_clock, lived, monkeypatch):
+    monkeypatch.setattr("reports.streaming.HELD", 1)  # a piece for each part
     jumps = {7: 0.4e-3, 50: 2.5e-3, 90: 3.3e-3}  # the first is late, but done in time
-    live = Loop(peg(), TICKS, fake_clock(jumps)).run("IAPB")
-    (due, start, end), pace = live.timetable.rows[:, :3].T, summary(live)
+    live, pace = lived(peg(), TICKS, fake_clock(jumps))
+    due, start, end = live.timetable.rows[:, :3].T
+    assert live.timetable.period == PERIOD
     assert np.all(start >= due) and np.all(end > start) and np.all(start[1:] >= end[:-1])
     assert np.all(due[1:] >= due[:-1] + PERIOD - 1e-12)  # a miss delays, and nothing is hurried
     assert np.flatnonzero(live.timetable.missed).tolist() == [50, 90] and pace.missed == 2
@@ -49,13 +44,13 @@ def scarce(simulation):
 
 
 @pytest.mark.parametrize("device", ["", "simulated"])
-def test_a_run_short_of_time_keeps_to_its_budgets_is_passive_and_repeats_exactly(peg, fake_clock, device):
+def test_a_run_short_of_time_keeps_to_its_budgets_is_passive_and_repeats_exactly(peg, fake_clock, lived, device):
     simulation = peg(device)
-    live = Loop(simulation, TICKS, fake_clock({40: 5e-3}), scarce(simulation)).run("IAPB")
+    live, pace = lived(simulation, TICKS, fake_clock({40: 5e-3}), scarce(simulation))
     impacts = live.run.impacts
     assert np.all(live.timetable.budget == 1) and len(impacts.step)
     assert np.all(impacts.rank <= live.timetable.budget[impacts.step])
-    assert impacts.rows.max() > 1 and summary(live).rows_left_out > 0
+    assert impacts.rows.max() > 1 and pace.rows_left_out > 0
     assert impacts.energy_lost.min() >= 0.0
     assert content_hash(replay(live)) == content_hash(live.run)
     live.timetable.rows[:, 3] = 3  # other budgets, another run
@@ -74,12 +69,11 @@ def test_the_budget_grows_with_the_time_left_between_one_row_and_all():
     assert budget.fixed == pytest.approx(1e-4, rel=1e-3)
 
 
-def test_with_time_enough_every_impact_gets_all_its_rows_and_the_summary_counts(peg, fake_clock):
+def test_with_time_enough_every_impact_gets_all_its_rows_and_the_summary_counts(peg, fake_clock, lived):
     simulation = peg()
     dofs = simulation.system.mechanism.nv
     assert calibrated(simulation, PERIOD).per_row > 0.0
-    live = Loop(simulation, TICKS, fake_clock({50: 2.5e-3}), RowBudget(0.0, 1e-6, PERIOD, dofs, 1)).run("IAPB")
-    pace = summary(live)
+    live, pace = lived(simulation, TICKS, fake_clock({50: 2.5e-3}), RowBudget(0.0, 1e-6, PERIOD, dofs, 1))
     assert np.all(np.delete(live.timetable.budget, 50) == dofs)
     assert (pace.ticks, pace.missed, pace.rows_left_out) == (TICKS, 1, 0)
     work = live.timetable.rows[:, 2] - live.timetable.rows[:, 1]
@@ -87,31 +81,13 @@ def test_with_time_enough_every_impact_gets_all_its_rows_and_the_summary_counts(
     assert pace.work == pytest.approx(np.percentile(work, PERCENTILES), rel=2e-3)
 
 
-def test_control_c_ends_the_loop_with_what_was_done(peg, fake_clock):
+def test_control_c_ends_the_loop_with_what_was_done(peg, fake_clock, lived):
     before = signal.getsignal(signal.SIGINT)
-    live = Loop(peg(), TICKS, fake_clock(at={123: lambda: os.kill(os.getpid(), signal.SIGINT)})).run("IAPB")
+    live, _ = lived(peg(), TICKS, fake_clock(at={123: lambda: os.kill(os.getpid(), signal.SIGINT)}))
     assert live.run.steps == 124 == len(live.timetable.due)  # the tick at hand is done to its end
     assert live.run.stopped == "interrupted" and not live.run.complete
     assert content_hash(replay(live)) == content_hash(live.run)
     assert signal.getsignal(signal.SIGINT) is before
-
-
-def test_a_loop_that_streams_comes_to_the_files_of_one_that_holds_all(peg, fake_clock, tmp_path, monkeypatch):
-    monkeypatch.setattr("reports.streaming.HELD", 1)  # a part for each chunk
-
-    def late():
-        return fake_clock({50: 2.5e-3})
-
-    held, ticks = Loop(peg(), 1500, late()).run("IAPB"), 1500
-    simulation = peg()
-    parts = open_parts(tmp_path, "live", simulation, "IAPB", ticks)
-    assert Loop(simulation, ticks, late(), parts=parts).stream() == ""
-    path, _, pace = finish_live(parts.folder, "")
-    parts.close(remove=True)
-    stored = read_live(path)
-    assert content_hash(stored.run) == content_hash(held.run) == content_hash(replay(stored))
-    assert pace == summary(stored) == summary(held)
-    assert stored.timetable.period == PERIOD and np.array_equal(stored.timetable.rows, held.timetable.rows)
 
 
 def test_a_live_run_that_is_killed_is_there_up_to_its_last_chunk(peg, fake_clock, tmp_path):
@@ -119,7 +95,7 @@ def test_a_live_run_that_is_killed_is_there_up_to_its_last_chunk(peg, fake_clock
     if process == 0:
         simulation = peg()
         parts = open_parts(tmp_path, "live", simulation, "IAPB", 2000)
-        Loop(simulation, 2000, fake_clock(at={1700: lambda: os._exit(9)}), parts=parts).stream()
+        Loop(simulation, 2000, parts, fake_clock(at={1700: lambda: os._exit(9)})).run()
     os.waitpid(process, 0)
     [parts] = parts_of_killed(tmp_path)
     assert is_live(parts)
@@ -151,11 +127,11 @@ class Fails:
         self.device.apply(force)
 
 
-def test_a_device_that_fails_or_a_motion_without_bounds_ends_the_loop_with_what_was_done(peg, fake_clock):
+def test_a_device_that_fails_or_a_motion_without_bounds_ends_the_loop_with_what_was_done(peg, fake_clock, lived):
     simulation = peg("simulated")
     device = simulation.link.device = Fails(simulation.link.device, 60)
-    live = Loop(simulation, TICKS, fake_clock()).run("IAPB")
+    live, _ = lived(simulation, TICKS, fake_clock())
     assert live.run.steps == 60 and "unplugged" in live.run.stopped
     assert np.array_equal(device.told[-1], np.zeros(3)) and np.any(device.told[-2])  # it is told to let go
-    live = Loop(peg(**{"couplings.four_channel.stiffness": [1e9] * 3}), TICKS, fake_clock()).run()
+    live, _ = lived(peg(**{"couplings.four_channel.stiffness": [1e9] * 3}), TICKS, fake_clock())
     assert "too long" in live.run.stopped and 0 < live.run.steps < TICKS

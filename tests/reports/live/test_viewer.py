@@ -22,7 +22,6 @@ from iapb.scene import find_scene, load_scene
 from reference.worlds import find_world
 from reports.live import browser
 from reports.live.device import live_simulation
-from reports.live.loop import Loop
 from reports.live.replay import replay
 from reports.live.viewer import SpringHand, Viewer
 from reports.live.window import SHOWN, SILENCE_SECONDS, TARGET, WANTED, Window
@@ -132,11 +131,11 @@ def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_
     assert capfd.readouterr().err == ""
 
 
-def test_the_loop_waits_for_no_viewer_that_sleeps_is_silent_or_has_died(viewer, peg, fake_clock):
+def test_the_loop_waits_for_no_viewer_that_sleeps_is_silent_or_has_died(viewer, peg, fake_clock, lived):
     def paced(started=100.0):
         simulation, clock = peg(), fake_clock()
         viewer._hand, clock.time = SpringHand(simulation), started
-        live = Loop(simulation, TICKS, clock, audience=viewer).run("IAPB")
+        live, _ = lived(simulation, TICKS, clock, audience=viewer)
         assert live.run.complete and not live.timetable.missed.any()
         return live, live.timetable.rows[:, 4:]
 
