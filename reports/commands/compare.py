@@ -33,7 +33,6 @@ _SHOWN = {
                  "largest change of KE, IAPB"),
     "convergence": ("scene", "events", "step", "error of positions", "order, positions", "order, velocities"),
 }  # fmt: skip
-_FACTORS = (1.0, 3.0, 10.0, 100.0, 1e5)  # of the printed performance profile
 
 
 def compare(
@@ -175,7 +174,7 @@ def _study_lines(found: Finding) -> list[str | Table]:
 
 
 def _problem_lines(found: Finding) -> list[str | Table]:
-    """Return the problems, each with the names of the solvers that did not solve it, and the profiles of times."""
+    """Return the problems, each with the names of the solvers that did not solve it."""
     lines: list[str | Table] = []
     for folder in (name for name, table in found.tables.items() if "why not read" in table.keys):
         rows = []
@@ -184,15 +183,6 @@ def _problem_lines(found: Finding) -> list[str | Table]:
             others = ", ".join(f"{name} {said}" for name, said in row.items() if said in ("refused", "failed"))
             solved = None if unread else sum(said == "solved" for said in row.values())
             rows.append((row["problem"], row.get("unknowns"), row.get("rank"), solved, unread or others or None))
-        shares: dict[tuple[str, str], list[float]] = {}
-        for row in found.tables["profile"].where(collection=folder).records():
-            within = shares.setdefault((row["solver"], row["kind"]), [0.0] * len(_FACTORS))
-            for k, factor in enumerate(_FACTORS):
-                within[k] = row["share solved"] if row["factor"] <= factor * (1 + 1e-9) else within[k]
         lines += [f"{folder}: every solver on every problem",
-                  titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows), "",
-                  "Performance profile (Dolan and Moré): solved within a factor of the fastest",
-                  titled(("solver", "kind", *(f"within {factor:g}" for factor in _FACTORS)),
-                         [(*key, *(f"{100 * share:.0f} %" for share in within)) for key, within in shares.items()]),
-                  ""]  # fmt: skip
+                  titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows), ""]  # fmt: skip
     return lines

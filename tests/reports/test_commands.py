@@ -291,17 +291,6 @@ def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(iapb
     assert answer(*wrong)[1]["distrust"] and "not to be trusted" in iapb("inspect", *tmp_path.glob("x/*.h5"))[1]
 
 
-@pytest.mark.parametrize(("arguments", "law", "effect"), [
-    (("bar_on_posts",), "impulse-augmented penalty", "unequal_restitution"),
-    (("sliding_box", "--world", "IAPB-friction"), "impulse-augmented penalty with impact friction", "impact_friction"),
-])  # fmt: skip
-def test_extensions_of_the_law_run_by_name_and_say_so_in_the_file(arguments, law, effect, iapb, tmp_path):
-    status, out, _ = iapb("run", *arguments, "--out", tmp_path, "--set", "duration=0.02")
-    run = read_run(next(tmp_path.glob("*.h5")))
-    assert status == 0 and f": {law}, coupling none." in out and run.law == law
-    assert effect in {row.name for row in run.effects if row.active}
-
-
 def test_check_warns_with_a_number_and_says_what_a_rigid_world_costs(iapb, answer):
     status, out, _ = iapb("check", "peg_corner")
     assert status == 0 and "the step holds contact.stiffness <= 2.62e+05 N/m" in out and "Nothing wrong" in out

@@ -31,10 +31,8 @@ from reports.runner import Runner
 from reports.store import keys
 from tests.reports.joined import joined
 from verification.claims import arm
-from verification.cost import effects, impacts
+from verification.cost import effects
 from verification.finding import NOT_COMPUTED, VERDICTS, Failure, Finding, Part, failure_of, finding_of
-from verification.hard_cases import judge
-from verification.hard_cases import study as hard_cases
 from verification.table import Column, Table
 
 Patch = pytest.MonkeyPatch
@@ -212,29 +210,6 @@ def of_claims(patch: Patch, folder: Path, failures: list[Failure]) -> None:
     assert len(second.tables["C07"].rows) == 2 * len(arm.PLACES) * len(arm.ANGLES) - 3
 
 
-def of_hard_cases(patch: Patch, folder: Path, failures: list[Failure]) -> None:
-    chosen = {name: judge.HARD_CASES[name] for name in ("grazing", "one_contact")}
-    chosen["lost"] = broken(chosen["grazing"], lambda: True)
-    patch.setattr(judge, "HARD_CASES", chosen)
-    patch.setattr(hard_cases, "HARD_CASES", chosen)
-    patch.setattr(judge, "judge_hard_case", broken(judge.judge_hard_case, lambda case, method, _: (
-        method, case.name) == ("svd", chosen["grazing"]().name)))  # fmt: skip
-    found = hard_cases.hard_cases(Runner(folder), nothing, failures)
-    assert [("svd" in [part.name for part in case.parts], case.key) for case in found] == [
-        (False, "grazing"), (True, "one_contact")]  # fmt: skip
-    assert hard_cases.on_hard_cases(found, failures).verdict == NOT_COMPUTED
-
-
-def of_accuracy(patch: Patch, folder: Path, failures: list[Failure]) -> None:
-    patch.setattr(impacts, "TIMED_HARDNESS", impacts.TIMED_HARDNESS[:1])
-    patch.setattr(impacts, "_ENOUGH", 0.0)
-    first, *others = ways = [way for way in impacts.WAYS if way.rows < 3]
-    ways[0] = replace(first, make=broken(first.make, lambda problem: True))
-    table = impacts.work_precision([(4, 3)], ways=ways, progress=nothing, failures=failures)
-    assert table.column("work") == [way.work for way in others]
-    failures[0] = replace(failures[0], case=failures[0].case.removeprefix(table.column("problem")[0]))
-
-
 def of_effects(patch: Patch, folder: Path, failures: list[Failure]) -> None:
     patch.setattr(effects, "scene_names", lambda: ("peg_corner", "arm_pushing"))
     patch.setattr(effects, "load_scene", broken(effects.load_scene, lambda path: path.stem == "arm_pushing"))
@@ -253,7 +228,6 @@ def of_runs(patch: Patch, folder: Path, failures: list[Failure]) -> None:
 
 STAGES = {
     of_claims: ["C01", "C07, slender rods, 0.0, 0.1", "C07, point masses at the tips, 0.0, 0.1"],
-    of_hard_cases: ["grazing, svd", "lost"], of_accuracy: [", IAPB, 1 row"],
     of_effects: ["peg_corner, impulses", "arm_pushing"], of_runs: ["hole/IAPB"],
 }  # fmt: skip
 

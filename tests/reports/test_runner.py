@@ -10,6 +10,8 @@ from iapb.simulation import INTERRUPTED, simulate
 from reports.evidence import exact_energy
 from reports.runner import Runner
 from reports.store import read_run
+from verification.check import Study
+from verification.complementarity import topic as complementarity
 
 PEG = load_scene(find_scene("peg_corner")).with_values({"duration": 1.2})
 
@@ -89,3 +91,10 @@ def test_every_engine_run_used_before_is_certified(tmp_path, monkeypatch):
     table = found.tables["certified runs"]
     assert table.column("impacts") == [len(run.impacts.step)] and len(run.impacts.step) > 0
     assert not inside and len(runner.files) == 2
+
+
+def test_a_run_of_any_world_states_its_contact_law(tmp_path):
+    worlds = complementarity.TOPIC.checks[-1].table(Study(Runner(tmp_path)), ("ideal", "IAPB", "PB"))
+    laws = {row["world"]: row for row in worlds.records()}
+    assert laws["IAPB"]["contact law"] != laws["PB"]["contact law"] != laws["ideal"]["contact law"]
+    assert "rendering" in laws["IAPB"]["its settings"]
