@@ -6,9 +6,9 @@
         begin the next step: compute coupling and contact law, send the force to the device
         publish the coordinates for the viewer
 
-The loop never waits for a lock or for the viewer, and Python's garbage collector is off. The next chunk of the record
-is allocated, and a full one is written as a part (`reports.store.parts`), when enough time is left before the next tick,
-or when too many chunks are waiting.
+The loop never waits for a lock or for the viewer. Python's garbage collector is off. The next chunk of the record is
+allocated, and a full one written as a part (`reports.store.parts`), when enough time is left before the next tick, or
+when too many chunks are waiting.
 """
 
 from __future__ import annotations
