@@ -22,7 +22,7 @@ from typing import Any
 from iapb.errors import ArgumentError
 from reports.crate import write_crate
 from reports.evidence.depends import FOLDERS, PACKAGES, depends_of, folder_hash
-from reports.figures.figure import Figure, NotComputed, Recipe
+from reports.figures.figure import Figure, Recipe
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.builder import FIRST_PAGE
 from reports.pages.records import Evidence
@@ -79,11 +79,11 @@ def remembering(
     drawn: dict[str, Figure] = {}
     failed: list[Failure] = [] if failures is None else failures
 
-    def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure | NotComputed:
+    def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure:
         figure = attempt(recipe.key, partial(recipe.draw, inputs), failed)
-        if isinstance(figure, Figure):
+        if figure is not None and figure.panels:
             drawn[recipe.key] = figure
-        return NotComputed(recipe.key, recipe.number, recipe.title) if figure is None else figure
+        return Figure(recipe.key, recipe.number, recipe.title) if figure is None else figure
 
     return tuple(replace(recipe, draw=partial(draw, recipe)) for recipe in recipes), drawn
 

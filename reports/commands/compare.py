@@ -14,7 +14,7 @@ from iapb.errors import ArgumentError
 from reference.datasets import problem_files, write_fclib
 from reference.worlds import run_world
 from reports.commands.run import Values, scene_given
-from reports.figures.figure import Figure, draw, standalone
+from reports.figures.figure import draw, standalone
 from reports.figures.worlds import worlds as worlds_figure
 from reports.show import Answer, Json, sentence, stage_progress, table_text
 from verification.check import Topic
@@ -93,7 +93,7 @@ def compare(
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in found.failures]
     drawn = draw(worlds_figure, found.tables) if scene is not None else None
     place.parent.mkdir(parents=True, exist_ok=True)
-    if isinstance(drawn, Figure):
+    if drawn is not None and drawn.panels:
         place.with_suffix(".svg").write_text(standalone(drawn), encoding="utf-8")
         lines.append(f"Figure: {place.with_suffix('.svg')}")
     answer = Answer(_facts(found), [*lines, f"Stored in {place}"], 1 if found.failures else 0)

@@ -18,7 +18,7 @@ from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, un
 from reports.evidence.gather import failed_cases, gather
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.figures import RECIPES
-from reports.figures.figure import Figure, draw, standalone
+from reports.figures.figure import draw, standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, figure_inputs
 from reports.pages.quantities import contradictions, unsaid
@@ -133,7 +133,7 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
     with stage_progress() as progress:
         inputs, failed = _inputs(recipes[key].needs, out, depth, progress)
     drawn = draw(recipes[key], inputs)
-    if not isinstance(drawn, Figure):
+    if not drawn.panels:
         raise ArgumentError("--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}")
     out.mkdir(parents=True, exist_ok=True)
     pictures = {f"{key}-{number}.{'html' if panel.is_table else 'svg'}": (panel.svg, panel.label)

@@ -111,8 +111,8 @@ def where_to_stop(numbers: Table) -> Drawn:
                 plot.axes.set_xscale("log")
                 plot.axes.set_xticks(_COUNTS, [str(count) for count in _COUNTS])
                 plot.axes.minorticks_off()
-            if (x, y) == ("contacts", "distance"):
-                plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
+                if y == "distance":
+                    plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
         panels.append(Panel(plot.svg, alt, label))
     pushed = max(row["pushing from the LCP"] for row in rows)
     return Drawn(panels, numbers, looks | {"stop here": BOUND},
@@ -141,15 +141,16 @@ def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
             for name, style in styles.items():
                 mine = [row for row in rows if row["solver"] == name]
                 timed = [row for row in mine if row["median"] is not None]
-                at, wrong = [row["contacts"] for row in timed], [row for row in timed if row["outcome"] == "failed"]
-                if len(at) > 1:
-                    plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
-                                           color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
-                plot.axes.plot(at, [row["median"] for row in timed], **line_arguments(style))
-                plot.axes.plot([row["contacts"] for row in wrong], [row["median"] for row in wrong], "x",
-                               color=style.color, markersize=10, markeredgewidth=1.8, zorder=5)
-                left_out = [row["contacts"] for row in mine if row["median"] is None]
-                plot.axes.plot(left_out, [top] * len(left_out), "^", color=style.color, markersize=6, zorder=5)
+                at = [row["contacts"] for row in timed]
+                plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
+                                       color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
+                plot.curve([(row["contacts"], row["median"]) for row in timed], style)
+                for mark, size, places in (
+                    ("x", 10, [(row["contacts"], row["median"]) for row in timed if row["outcome"] == "failed"]),
+                    ("^", 6, [(row["contacts"], top) for row in mine if row["median"] is None]),
+                ):  # fmt: skip
+                    plot.curve(places, LineStyle(style.color, mark, width=0.0), markersize=size, markeredgewidth=1.8,
+                               markeredgecolor=style.color, zorder=5)  # fmt: skip
             plot.log("contacts", "time of one impact [µs]")
             plot.ticks("x", sorted({row["contacts"] for row in rows}))
         words = ", ".join(f"{row['solver']} {row['median']:.3g}" for row in rows
@@ -176,29 +177,25 @@ def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
 @recipe("performance-profile", "complementarity/profile")
 def performance_profile(numbers: Table) -> Drawn:
     """Draw a panel for each collection and kind of problem; the solvers of each kind have their own numbering."""
-    panels, rows = list[Panel](), list[tuple[Any, ...]]()
-    legend: dict[str, LineStyle] = {}
+    panels, rows, legend = list[Panel](), list[tuple[Any, ...]](), dict[str, LineStyle]()
     for kind, collection in dict.fromkeys(numbers.select(("kind", "collection")).rows):
+        here, words = numbers.where(kind=kind, collection=collection), []
         looks = looks_of(name for name in numbers.where(kind=kind).column("solver") if name in STYLES)
         legend |= looks
-        curves: dict[str, list[tuple[float, float]]] = {}
-        for solver, *point in numbers.where(kind=kind, collection=collection).select(_PROFILE).rows:
-            curves.setdefault(solver, []).append((point[0], point[1]))
         with Plot(f"performance-profile-{collection.replace(' ', '-')}-{kind}", (4.4, 3.2)) as plot:
-            for number, (solver, look) in enumerate(looks.items()):
-                if solver in curves:
-                    how = line_arguments(look) | {"markevery": (number % 5, 9)}
-                    plot.axes.step(*zip(*curves[solver], strict=True), where="post", **how)
+            for number, solver in enumerate(dict.fromkeys([*looks, *here.column("solver")])):
+                if curve := here.where(solver=solver).select(("factor", "share solved")).rows:
+                    words.append(f"{solver} {curve[-1][1]:.0%}")
+                    rows.append((collection, kind, solver, curve[0][1], curve[-1][1]))
+                    if solver in looks:
+                        plot.curve(curve, looks[solver], drawstyle="steps-post", markevery=(number % 5, 9))
             plot.log("factor of the fastest solver's time", "share of problems solved", "x", ylim=(-0.02, 1.03))
             plot.ticks("y", [0.0, 0.25, 0.5, 0.75, 1.0])
-        words = ", ".join(f"{solver} {curve[-1][1]:.0%}" for solver, curve in curves.items())
-        panels.append(Panel(plot.svg, f"Shares solved at all: {words}.", f"{collection}, {kind}"))
-        rows += [(collection, kind, solver, curve[0][1], curve[-1][1]) for solver, curve in curves.items()]
+        panels.append(Panel(plot.svg, f"Shares solved at all: {', '.join(words)}.", f"{collection}, {kind}"))
     ends = ("share as the fastest", "share solved at all")
     return Drawn(panels, titled(("collection", "kind", "solver", *ends), rows, 3, timed=ends), legend)
 
 
-_PROFILE = ("solver", "factor", "share solved")
 _ROUNDING = 1e-12  # smaller errors count as none
 _SCENES = 6  # shown, those with the largest errors
 _ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over time": "error of velocities"}
@@ -220,9 +217,8 @@ def rigid_convergence(numbers: Table) -> Drawn:
                 plot.curve(curve, look)
                 drawn += curve
             if drawn:  # a line of slope one below all curves
-                lowest = min(error / step for step, error in drawn)
-                ends = (min(drawn)[0], max(drawn)[0])
-                plot.curve([(step, 0.5 * lowest * step) for step in ends], BOUND, marked=False)
+                lowest, steps = min(error / step for step, error in drawn), [step for step, _ in drawn]
+                plot.curve([(step, 0.5 * lowest * step) for step in (min(steps), max(steps))], BOUND, marked=False)
             plot.log("step [ms]", "error")
             plot.ticks("x", sorted(set(numbers.column("step"))), "{:.2g}")
         panels.append(Panel(plot.svg, f"Errors of {label} against the step.", label))

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
-from reports.figures.figure import Cell, Drawn, Panel, grid, recipe, swatch
+from reports.figures.figure import Drawn, Panel, cell, grid, recipe, swatch
 from reports.figures.labels import SIZE, label_marks
 from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot, note
-from reports.figures.style import (
-    BLUE,
-    FORCE,
-    INK,
-    MUTED,
-    OUTCOMES,
-    STYLES,
-    LineStyle,
-    line_arguments,
-    looks_of,
-)
+from reports.figures.style import BLUE, FORCE, INK, MUTED, OUTCOMES, STYLES, LineStyle, looks_of
 from verification.claims.speed import costs_more
 from verification.cost import impacts
 from verification.cost import trajectories as motion
@@ -48,24 +39,20 @@ _DECADES = [10.0**k for k in range(-1, 5)]  # ticks of a time [µs]
 def which_method(numbers: Table) -> Drawn:
     """Draw a cell per size and budget."""
     found = impacts.choices(numbers)
-    cells: dict[str, list[Cell]] = {}
+    cells: dict[str, list[Markup]] = {}
     for row in found.records():
-        look = (MUTED, 0.0) if row["method"] == "none" else (
-            _LOOKS[row["method"]].color, _STRONG if row["largest error"] <= _EXACT else _WEAK)
-        cells.setdefault(f"{_contacts(row)}, d = {row['coordinates']}", []).append(
-            Cell(row["method"], _cell_note(row), *look))
-    told = "; ".join(f"{row['contacts']} contacts in {row['budget']:g} µs: {row['method']}"
-                     for row in found.records())
+        words, look = "", (MUTED, 0.0)
+        if row["method"] != "none":
+            look = _LOOKS[row["method"]].color, _STRONG if row["largest error"] <= _EXACT else _WEAK
+            stopped = f"{row['work']}: " if row["work"][0].isdigit() else ""
+            share = "" if row["share solved"] > 99 else f", {row['share solved']:.0f} %"
+            words = f"{stopped}{power_of_error(row['largest error'])}{share}"
+        elif row["nearest"]:
+            words = f"nearest: {row['nearest'].split(':')[-1].strip()}"
+        cells.setdefault(f"{_contacts(row)}, d = {row['coordinates']}", []).append(cell(row["method"], words, *look))
+    told = "; ".join(f"{row['contacts']} contacts in {row['budget']:g} µs: {row['method']}" for row in found.records())
     budgets = [impacts.short_time(1e-6 * budget) for budget in dict.fromkeys(found.column("budget"))]
     return Drawn([Panel(grid(budgets, cells), told, wide=True)], found)
-
-
-def _cell_note(row: Row) -> str:
-    if row["method"] == "none":
-        return f"nearest: {row['nearest'].split(':')[-1].strip()}" if row["nearest"] else ""
-    stopped = f"{row['work']}: " if row["work"][0].isdigit() else ""
-    share = "" if row["share solved"] > 99 else f", {row['share solved']:.0f} %"
-    return f"{stopped}{power_of_error(row['largest error'])}{share}"
 
 
 def power_of_error(value: float) -> str:
@@ -191,14 +178,15 @@ def budget_share(numbers: Table) -> Drawn:
                         case = row["contacts"], row["problem"]
                         first[case] = min(row["time"], first.get(case, np.inf))
                 heights = [100.0 * k / cases for k in range(len(first) + 1)]
-                plot.axes.step([0.05, *sorted(first.values()), _LONGEST], [*heights, heights[-1]], where="post",
-                               **line_arguments(look, marked=False))
+                times = [0.05, *sorted(first.values()), _LONGEST]
+                plot.curve(zip(times, [*heights, heights[-1]], strict=True), look, marked=False,
+                           drawstyle="steps-post")  # fmt: skip
                 ends.append((heights[-1], f"{look.name} {heights[-1]:.0f} %", look))
             plot.log("time budget [µs]", "impacts solved [%]", "x", xlim=(0.05, 100.0 * _LONGEST), ylim=(0, 104))
             plot.ticks("y", range(0, 101, 20))
             plot.axes.set_xticks(_DECADES)
             place = np.inf
-            for height, name, look in sorted(ends, key=lambda end: -end[0]):
+            for height, name, look in sorted(ends, key=lambda end: -end[0]):  # names at the ends, one below the other
                 place = min(height, place - 6.5)
                 plot.axes.text(1.2 * _LONGEST, place, name, fontsize=SIZE, color=look.color, va="center")
         alt = f"Share of impacts solved to {tolerance:g} against time for {', '.join(_LOOKS)}."
@@ -218,41 +206,33 @@ _NEVER = "never worth its time here"
 _PALE = 0.45  # strength of marks that are not used
 
 
-@recipe("trajectory-precision", "haptic-rate/motions")
-def trajectory_precision(motions: Table) -> Drawn:
-    """Draw the worlds: a panel with a table, and a panel per scene."""
-    return _precision("trajectory-precision", motions, _WORLDS)
-
-
-@recipe("integrator-precision", "haptic-rate/motions")
-def integrator_precision(motions: Table) -> Drawn:
-    """Draw the integrators in the same way as the worlds."""
-    return _precision("integrator-precision", motions, _INTEGRATORS)
-
-
 def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle]) -> Drawn:
+    """Draw what a motion costs by world or by integrator: a panel with a table, and a panel per scene."""
     looks = {name: look for name, look in drawn.items() if name in motions.column("method")}
     found, worth = motion.curves(motions, tuple(looks)), motion.worth(motions, tuple(looks))
-    lines, table = [], dict[str, Sequence[Cell]]()
+    told, table = [], dict[str, Sequence[Markup]]()
     for row in worth.records():
-        look = looks[row["method"]]
-        line, cells = _worth_said(row, look.name)
-        lines.append(line)
+        look, words = looks[row["method"]], _worth_said(row)
+        told.append(f"{look.name}: " + ", ".join(map("{}: {}".format, _HEADINGS, words)))
         table[Markup("{} {}").format(swatch(look), look.name)] = [
-            Cell(Markup("<b>{}</b>").format(words) if words == _NEVER else words) for words in cells]
-    panels = [Panel(grid(_HEADINGS, table, "plain"), "; ".join(lines), wide=True)]
+            cell(Markup("<b>{}</b>").format(said) if said == _NEVER else said) for said in words]
+    panels = [Panel(grid(_HEADINGS, table, "plain"), "; ".join(told), wide=True)]
     for number, scene in enumerate(dict.fromkeys(motions.column("scene"))):
         here = [curve for curve in found if curve.scene == scene]
         said = ", ".join(f"{looks[curve.method].name}: {curve.words}" for curve in here)
         lost = motions.only(outcome != "ok" for outcome in motions.column("outcome")).where(scene=scene)
         panels.append(Panel(_motions(f"{key}-{number}", here, lost, looks),
                             f"{scene}: error of position against computing time. {said}.", scene))
-    told = {"gained": motion.GAINED, "runs": motion.FIT_RUNS, "fall": motion.FIT_FALL, "useful": motion.USEFUL}
-    return Drawn(panels, worth, {look.name: look for look in looks.values()} | {"best for its time": _FRONT}, told)
+    limits = {"gained": motion.GAINED, "runs": motion.FIT_RUNS, "fall": motion.FIT_FALL, "useful": motion.USEFUL}
+    return Drawn(panels, worth, {look.name: look for look in looks.values()} | {"best for its time": _FRONT}, limits)
 
 
-def _worth_said(row: Row, name: str) -> tuple[str, tuple[str, ...]]:
-    """Return a line of the table of main numbers, as one text and as the text of each column."""
+RECIPES = tuple(recipe(key, "haptic-rate/motions")(partial(_precision, key, drawn=drawn)) for key, drawn in
+                (("trajectory-precision", _WORLDS), ("integrator-precision", _INTEGRATORS)))
+
+
+def _worth_said(row: Row) -> tuple[str, ...]:
+    """Return a line of the table of main numbers, a text for each column."""
     scenes = row["scenes"]
     cost = "no step buys it: the error stays" if row["error stays"] == scenes else "too few runs for a fit"
     if row["scenes fitted"]:
@@ -264,8 +244,7 @@ def _worth_said(row: Row, name: str) -> tuple[str, tuple[str, ...]]:
         errors = dict.fromkeys(power_of_error(row[key]) for key in ("most exact there", "least exact there"))
         best = f"{row['best for its time']} of {scenes} scenes, {' to '.join(errors)}"
     made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > impacts.NO_GAIN else "none"
-    cells = (row["called"], cost, power_of_error(row["least error"]), best, made)
-    return f"{name}: ten times the accuracy: {cost}; best for its time: {best}; energy made: {made}", cells
+    return row["called"], cost, power_of_error(row["least error"]), best, made
 
 
 def _motions(key: str, here: Sequence[motion.Curve], lost: Table, looks: Mapping[str, LineStyle]) -> str:
@@ -301,19 +280,19 @@ def anytime(numbers: Table) -> Drawn:
     for row in numbers.records():
         sizes.setdefault(f"{row['contacts']} contacts", []).append(row)
     looks, panels, ranges = looks_of(sizes), [], {}
-    for key, name, alt, label, height in (
+    for key, name, alt, label in (
         ("velocity", "velocity left [%]", "Velocity left against the share of rows done.",
-         "normal velocity that is left, of that before the impact",
-         lambda row, first: row["median residual"] / first["median residual"]),
+         "normal velocity that is left, of that before the impact"),
         ("energy", "energy loss missing [%]", "Missing loss against the share of rows done.",
-         "missing part of the energy that the complete impact takes", lambda row, _: 1.0 - row["share of the loss"]),
+         "missing part of the energy that the complete impact takes"),
     ):  # fmt: skip
         halves = []
         with Plot(f"anytime-{key}") as plot:
             plot.axes.axvspan(49.0, 51.0, color=MUTED, alpha=0.2, linewidth=0)
             for size, rows in sizes.items():
                 done = [100.0 * row["budget"] / row["rank"] for row in rows]
-                left = [100.0 * height(row, rows[0]) for row in rows]
+                left = [100.0 * (row["median residual"] / rows[0]["median residual"] if key == "velocity" else
+                                 1.0 - row["share of the loss"]) for row in rows]  # fmt: skip
                 halves.append(float(f"{np.interp(50.0, done, left):.2g}"))
                 plot.curve(zip(done, left, strict=True), looks[size])
                 plot.words[size] = f": {halves[-1]:g} % after half"
@@ -343,8 +322,7 @@ def impact_scaling(numbers: Table, fitted: Table) -> Drawn:
                 size, middle, low, high = (np.array(part) for part in zip(*rows, strict=True))
                 plot.marks(zip(size, middle, strict=True), look)
                 plot.axes.vlines(size, low, high, color=look.color, linewidth=1.0)
-                row = powers[method, axis]
-                power = row["exponent"]
+                power = (row := powers[method, axis])["exponent"]
                 level = np.exp(np.mean(np.log(middle) - power * np.log(size)))
                 plot.axes.plot(size, level * size**power, color=look.color, linewidth=0.9)
                 plot.words[look.name] = (f": exponent {power:.2f}, {row['there']:.2f} from {row['steepest from']:g} to "
@@ -387,13 +365,13 @@ def effect_costs(numbers: Table) -> Drawn:
     panels, looks = [], {"yes": STYLES["IAPB"], "no": OUTCOMES["cannot tell"]}
     for scene in dict.fromkeys(numbers.column("scene")):
         rows = numbers.where(scene=scene).records()
-        places = [(row["time saved"], max(row["error"], _NOTHING)) for row in rows]
-        kinds = [row["best of its error"] for row in rows]
-        best, others = ([place for place, own in zip(places, kinds, strict=True) if own == kind] for kind in looks)
+        saved = [row["time saved"] for row in rows]
+        places = list(zip(saved, [max(row["error"], _NOTHING) for row in rows], strict=True))
+        best, others = ([place for place, row in zip(places, rows, strict=True) if row["best of its error"] == kind]
+                        for kind in looks)  # fmt: skip
         with Plot(f"effect-costs-{scene}", (4.6, 3.6)) as plot:
             plot.curve(sorted(best), looks["yes"], linewidth=0.8)
             plot.marks(others, looks["no"])
-            saved = [row["time saved"] for row in rows]
             least, span = min(0.0, *saved), max(saved) - min(0.0, *saved)
             plot.log("time of the step saved [%]", "error [mm]", "y", xlim=(least - 0.62 * span, least + 1.4 * span))
             plot.axes.set_xticks([x for x in plot.axes.get_xticks() if least <= x <= least + 1.4 * span])
@@ -401,7 +379,7 @@ def effect_costs(numbers: Table) -> Drawn:
             plot.axes.yaxis.get_major_locator().set_params(numticks=8)
             plot.axes.yaxis.set_major_formatter(lambda y, _: power_of_ten(y) if y > _NOTHING else "none")
             label_marks(plot.axes, [row["effect"].replace("_", " ") for row in rows], places,
-                        [looks[kind].color for kind in kinds])
+                        [looks[row["best of its error"]].color for row in rows])
         names = ", ".join(row["effect"] for row in rows)
         panels.append(Panel(plot.svg, f"{scene}: error against time saved for {names}.", scene))
     return Drawn(panels, numbers)

@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from math import log10
 from typing import Any
 
-from reports.figures.figure import Cell, Drawn, Panel, grid, recipe
+from markupsafe import Markup
+
+from reports.figures.figure import Drawn, Panel, cell, grid, recipe
 from reports.figures.numbers import MINUS
 from reports.figures.style import AMBER, BLUE, RULE, SKY, VERMILION, LineStyle
 from verification.table import Table
@@ -26,10 +28,10 @@ def engine_errors(numbers: Table) -> Drawn:
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     panels = []
     for column, label in _PANELS:
-        lines: dict[str, dict[str, Cell]] = {}
+        lines: dict[str, dict[str, Markup]] = {}
         for row in rows:
             lines.setdefault(f"{row['engine']}, {_at(row)}", {})[row["scene"]] = _cell(row, _value(row, column))
-        cells = {line: [found.get(scene, Cell()) for scene in scenes] for line, found in lines.items()}
+        cells = {line: [found.get(scene, cell()) for scene in scenes] for line, found in lines.items()}
         panels.append(Panel(grid(scenes, cells, "upright"), _words(rows, column), label))
     return Drawn(panels, numbers, {name: LineStyle(color, "s", (), 0.0) for name, (_, color, _) in LEVELS.items()})
 
@@ -40,15 +42,15 @@ def _value(row: Row, column: str) -> float | None:
     return None if value is None else abs(value)
 
 
-def _cell(row: Row, value: float | None) -> Cell:
+def _cell(row: Row, value: float | None) -> Markup:
     if row["law"] == "not installed":
-        return Cell(hatched=True)
+        return cell(kind="hatched")
     if row["law"] == "failed":
-        return Cell("✕", color=VERMILION)
+        return cell("✕", color=VERMILION)
     if value is None:
-        return Cell(color=RULE, strength=0.35)
+        return cell(color=RULE, strength=0.35)
     color, strength = next((color, strength) for most, color, strength in LEVELS.values() if value <= most)
-    return Cell("ε" if value < ROUNDING else f"{round(log10(value))}".replace("-", MINUS), "", color, strength)
+    return cell("ε" if value < ROUNDING else f"{round(log10(value))}".replace("-", MINUS), "", color, strength)
 
 
 def _at(row: Row) -> str:

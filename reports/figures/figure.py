@@ -38,37 +38,25 @@ class Panel:
         return self.svg.startswith("<table")
 
 
-@dataclass(frozen=True)
-class Cell:
-    """A cell of a table: its text, a smaller note below, and a colour of the text or, with a strength, of the cell."""
-
-    text: str | Markup = ""
-    note: str = ""
-    color: str = ""
-    strength: float = 0.0
-    hatched: bool = False
-
-    @property
-    def html(self) -> Markup:
-        """The cell as HTML."""
-        look = f"color: {css(self.color)}" if self.color else ""
-        if self.strength:
-            look = f"background: color-mix(in srgb, {css(self.color)} {100 * self.strength:g}%, transparent)"
-        note = Markup("<small>{}</small>").format(self.note) if self.note else ""
-        marked = Markup(' class="hatched"') if self.hatched else ""
-        return Markup('<td{}{}>{}{}</td>').format(marked, Markup(' style="{}"').format(look) if look else "",
-                                                  self.text, note)
+def cell(text: str | Markup = "", note: str = "", color: str = "", strength: float = 0.0, kind: str = "") -> Markup:
+    """Return a cell of a table: its text, a smaller note, and a colour of the text or, with a strength, of the cell."""
+    look = f"color: {css(color)}" if color else ""
+    if strength:
+        look = f"background: color-mix(in srgb, {css(color)} {100 * strength:g}%, transparent)"
+    attributes = Markup("").join(Markup(' {}="{}"').format(name, value)
+                                 for name, value in (("class", kind), ("style", look)) if value)
+    small = Markup("<small>{}</small>").format(note) if note else ""
+    return Markup("<td{}>{}{}</td>").format(attributes, text, small)
 
 
-def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Cell]], kind: str = "") -> str:
+def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Markup]], kind: str = "") -> str:
     """Return a table of cells as HTML: a heading for each column and, as text or Markup, for each row.
 
     kind : "upright" for headings of columns that take less width, "plain" for texts instead of coloured cells
     """
     join = Markup("").join
     head = join(Markup('<th scope="col"><span>{}</span></th>').format(column) for column in columns)
-    body = join(Markup('<tr><th scope="row">{}</th>{}</tr>').format(name, join(cell.html for cell in cells))
-                for name, cells in rows.items())  # fmt: skip
+    body = join(Markup('<tr><th scope="row">{}</th>{}</tr>').format(name, join(cells)) for name, cells in rows.items())
     return Markup('<table class="grid {}"><thead><tr><td></td>{}</tr></thead><tbody>{}</tbody></table>').format(
         kind, head, body)  # fmt: skip
 
@@ -85,25 +73,19 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawn figure. `number` is its number in the paper ("Figure 7"), or empty for a figure of this project."""
+    """A figure. `number` is its number in the paper ("Figure 7"), or empty for a figure of this project.
+
+    inputs : names of the runs and tables it was drawn from; missing : those that it lacks, so that it has no panels
+    """
 
     key: str
     number: str
     title: str
-    caption: str
-    panels: tuple[Panel, ...]
+    caption: str = ""
+    panels: tuple[Panel, ...] = ()
     numbers: Table | None = None
     legend: tuple[tuple[str, LineStyle], ...] = ()
-    inputs: tuple[str, ...] = ()  # names of the runs and tables it was drawn from
-
-
-@dataclass(frozen=True)
-class NotComputed:
-    """The substitute for a figure that was not drawn: its title, and which inputs are missing."""
-
-    key: str
-    number: str
-    title: str
+    inputs: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
 
 
@@ -118,7 +100,7 @@ class Recipe:
     number: str
     title: str
     needs: tuple[str, ...]
-    draw: Callable[[Mapping[str, Any]], Figure | NotComputed]
+    draw: Callable[[Mapping[str, Any]], Figure]
     section: str = "figures"
 
 
@@ -144,10 +126,10 @@ def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
     return made
 
 
-def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure | NotComputed:
-    """Draw one figure, or return which of its inputs are missing."""
+def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure:
+    """Draw one figure, or return one without panels that says which of its inputs are missing."""
     missing = tuple(name for name in recipe.needs if inputs.get(name) is None)
-    return NotComputed(recipe.key, recipe.number, recipe.title, missing) if missing else recipe.draw(inputs)
+    return Figure(recipe.key, recipe.number, recipe.title, missing=missing) if missing else recipe.draw(inputs)
 
 
 # A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of the page's variables

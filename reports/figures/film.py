@@ -122,33 +122,30 @@ class Film:
             yield f'<g>{moved}<g><path {look} d="{"".join(map(_ring, rings))}"/>{turned}</g></g>'
 
     def marks(self) -> Iterator[str]:
-        """Yield the contacts at a moment and the impulses since the one before."""
+        """Yield the contacts at a moment and the impulses since the one before: of the strongest ones, a dot and a line
+        for each contact, a cross for each impulse; the size is a root of the strength."""
         contacts, steps = self.run.contacts, _moments(self.run, _MARKED)
         for k, step in enumerate(steps[:-1]):
-            now = slice(int(contacts.offsets[step]), int(contacts.offsets[step + 1]))
-            since = slice(int(contacts.offsets[steps[k - 1]] if k else 0), now.stop)
+            begins, ends = (int(contacts.offsets[each]) for each in (step, step + 1))
+            before = int(contacts.offsets[steps[k - 1]]) if k else 0
             span = self.run.time[step] / self.end, self.run.time[steps[k + 1]] / self.end
-            for strengths, part, color in ((contacts.normal_force, now, BLUE), (contacts.impulse, since, FORCE)):
-                if drawn := "".join(self._mark(strengths, part, cross=color == FORCE)):
+            for strengths, first, color in ((contacts.normal_force, begins, BLUE), (contacts.impulse, before, FORCE)):
+                drawn, chosen = "", first + np.flatnonzero(strengths[first:ends] > 0.0)
+                for row in chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]:
+                    (x, y), size = self.flat(contacts.point[row]), np.sqrt(strengths[row] / strengths.max())
+                    if not (0.0 <= x <= SIZE[0] and 0.0 <= y <= SIZE[1]):
+                        continue
+                    if color == FORCE:
+                        arm = 6 + 8 * size
+                        drawn += f"M{x - arm:.1f} {y:.1f}h{2 * arm:.1f}M{x:.1f} {y - arm:.1f}v{2 * arm:.1f}"
+                    else:
+                        nx, ny = (6 + 26 * size) * _sign(self.run) * contacts.normal[row][:2]
+                        drawn += f"M{x - 3:.1f} {y:.1f}a3 3 0 1 0 6 0a3 3 0 1 0 -6 0M{x:.1f} {y:.1f}l{nx:.1f} {-ny:.1f}"
+                if drawn:
                     yield (f'<path fill="none" stroke="{css(color)}" stroke-width="2" d="{drawn}">'
                            f'<animate attributeName="display" values="none;inline;none" calcMode="discrete" '
                            f'keyTimes="0;{max(span[0], 1e-4):.4f};{span[1]:.4f}" dur="{self.slower * self.end:g}s" '
                            'repeatCount="indefinite"/></path>')
-
-    def _mark(self, strengths: Floats, part: slice, *, cross: bool) -> Iterator[str]:
-        """Yield a dot and a line for each of the strongest contacts, or a cross; its size is a root of the strength."""
-        largest = float(strengths.max(initial=0.0))
-        chosen = np.arange(part.start, part.stop)[strengths[part] > 0.0]
-        for row in chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]:
-            (x, y), size = self.flat(self.run.contacts.point[row]), float(np.sqrt(strengths[row] / largest))
-            if not (0.0 <= x <= SIZE[0] and 0.0 <= y <= SIZE[1]):
-                continue
-            if cross:
-                arm = 6 + 8 * size
-                yield f"M{x - arm:.1f} {y:.1f}h{2 * arm:.1f}M{x:.1f} {y - arm:.1f}v{2 * arm:.1f}"
-            else:
-                nx, ny = (6 + 26 * size) * _sign(self.run) * self.run.contacts.normal[row][:2]
-                yield f"M{x - 3:.1f} {y:.1f}a3 3 0 1 0 6 0a3 3 0 1 0 -6 0M{x:.1f} {y:.1f}l{nx:.1f} {-ny:.1f}"
 
 
 def _ring(points: Floats) -> str:

@@ -24,6 +24,7 @@ _CIRCLE_CORNERS, _BALL_CORNERS = 72, 48
 _THICKNESS = 0.1  # of planar shapes, as a share of the scene's size
 _REACH = 3.0  # of walls without end, as a multiple of the scene's size
 _RINGS = 12  # of a ball, from pole to pole
+_SQUARE = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
 
 def is_spatial(scene: Mapping[str, Any]) -> bool:
@@ -76,12 +77,13 @@ def outline(shape: Mapping[str, Any]) -> Floats:
     """Return the corners of a box, circle or polygon in the frame of its body."""
     frame = placement_of(shape)
     if shape["kind"] == "circle":
-        turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
-        return frame.of(shape["radius"] * np.column_stack([np.cos(turn), np.sin(turn)]))
-    if shape["kind"] == "box":
-        half = np.asarray(shape["size"], dtype=float) / 2.0
-        return frame.of(half * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]))
-    return frame.of(shape["vertices"])
+        return frame.of(shape["radius"] * _circle(_CIRCLE_CORNERS))
+    return frame.of(0.5 * np.asarray(shape["size"]) * _SQUARE if shape["kind"] == "box" else shape["vertices"])
+
+
+def _circle(corners: int) -> Floats:
+    turn = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    return np.column_stack([np.cos(turn), np.sin(turn)])
 
 
 def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
@@ -162,8 +164,8 @@ def prism(body: str, corners: Floats, low: float, high: float, frame: Placement 
 
 def cuboid(body: str, frame: Placement, size: Any) -> Solid:
     """Return a box around the origin of its frame."""
-    x, y, z = np.asarray(size, dtype=float) / 2.0
-    return prism(body, np.array([[x, y], [-x, y], [-x, -y], [x, -y]]), -z, z, frame)
+    half = np.asarray(size, dtype=float) / 2.0
+    return prism(body, half[:2] * _SQUARE, -half[2], half[2], frame)
 
 
 def plane_frame(wall: Mapping[str, Any]) -> Placement:
@@ -196,8 +198,7 @@ def solids(scene: Mapping[str, Any], size: float | None = None) -> Iterator[Soli
             yield prism(name, half_plane(shape, _REACH * size), -0.9 * half, 0.9 * half)
         elif shape["kind"] == "half_space":
             reach = 0.5 * _REACH * size
-            square = reach * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-            yield prism(name, square, -0.04 * reach, 0.0, plane_frame(shape))
+            yield prism(name, reach * _SQUARE, -0.04 * reach, 0.0, plane_frame(shape))
         elif shape["kind"] == "sphere":
             yield _ball(name, shape["center"], shape["radius"])
         elif is_spatial(scene):
@@ -231,34 +232,31 @@ def cuboid_of_inertia(body: Mapping[str, Any]) -> Floats:
 
 @dataclass(frozen=True)
 class View:
-    """A viewing direction: `across` and `up` (3,) span the picture, `towards` points at the reader."""
+    """A viewing direction: the rows of `axes` (3, 3) point to the right, up and at the reader."""
 
-    across: Floats
-    up: Floats
-    towards: Floats
+    axes: Floats
 
     def flat(self, points: Any) -> Floats:
         """Return the projection (..., 2) [m] of points (..., 3) to the picture."""
-        return np.asarray(points, dtype=float) @ np.column_stack([self.across, self.up])
+        return np.asarray(points, dtype=float) @ self.axes[:2].T
 
     def depth(self, points: Any) -> float:
-        """Return the coordinate [m] of the mean of some points along `towards`; it is larger nearer to the reader."""
-        return float(np.mean(np.asarray(points, dtype=float) @ self.towards))
+        """Return how near [m] the mean of some points (..., 3) is to the reader."""
+        return float(np.mean(np.asarray(points, dtype=float) @ self.axes[2]))
 
     def faces_reader(self, ring: Floats) -> bool:
         """Return whether a ring of corners is seen from outside."""
-        return float(np.cross(ring[1] - ring[0], ring[2] - ring[1]) @ self.towards) > 0.0
+        return float(np.cross(ring[1] - ring[0], ring[2] - ring[1]) @ self.axes[2]) > 0.0
 
     def disc(self, center: Floats, radius: float) -> Floats:
         """Return the outline (n, 3) of a ball: a circle perpendicular to the line of sight."""
-        turn = np.linspace(0.0, 2.0 * np.pi, _BALL_CORNERS, endpoint=False)
-        return center + radius * (np.outer(np.cos(turn), self.across) + np.outer(np.sin(turn), self.up))
+        return center + radius * _circle(_BALL_CORNERS) @ self.axes[:2]
 
 
 def view(azimuth: float, elevation: float) -> View:
     """Return the view from `azimuth` [rad] about z, counter-clockwise from x, and from `elevation` above the floor."""
     (ca, ce), (sa, se) = np.cos((azimuth, elevation)), np.sin((azimuth, elevation))
-    return View(np.array([-sa, ca, 0.0]), np.array([-ca * se, -sa * se, ce]), np.array([ca * ce, sa * ce, se]))
+    return View(np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]))
 
 
 def links(scene: Mapping[str, Any], pose: Floats | None = None) -> Sequence[tuple[Floats, Floats]]:

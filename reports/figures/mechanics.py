@@ -118,11 +118,11 @@ def socket_collisions(times: Table, counts: Table) -> Drawn:
         panels.append(Panel(plot.svg, alt, title))
     dampings = sorted(set(counts.column("damping")))
     with Plot("socket-collisions-damping") as plot:
-        for row in counts.records():
-            number = list(FILTERS).index(row["filters"])
-            place = dampings.index(row["damping"]) + 0.2 * (number - 1.5)
-            plot.axes.bar(place, row["false collisions"], width=0.17, color=FILTERS[row["filters"]].color)
-            note(plot.axes, (place, row["false collisions"]), str(row["false collisions"]), (0, 6), fontsize=8)
+        for number, (setting, style) in enumerate(FILTERS.items()):
+            mine = counts.where(filters=setting)
+            places = [dampings.index(damping) + 0.2 * (number - 1.5) for damping in mine.column("damping")]
+            bars = plot.axes.bar(places, mine.column("false collisions"), width=0.17, color=style.color)
+            plot.axes.bar_label(bars, fontsize=8, padding=2)
         plot.axes.set_xticks(range(len(dampings)), [f"{b:g}" for b in dampings])
         plot.axes.grid(visible=False, axis="x")
         plot.axes.set(xlabel="damping of the contact [N s/m]", ylabel="false collisions in 2 s")
@@ -138,7 +138,6 @@ TREATMENTS = {
 }
 CRADLE, BERNOULLI = "cradle of 5", "Bernoulli"
 ROUNDING = 1e-12  # smaller changes count as none
-_RADIUS = 0.5
 _ORDERS = {"contact 0, then 1": "the upper ball first", "contact 1, then 0": "the lower ball first"}
 
 
@@ -156,6 +155,13 @@ class Outcome(NamedTuple):
         """Return the colour and marker of the treatment."""
         return next(look for start, look in TREATMENTS.items() if self.treatment.startswith(start))
 
+    @property
+    def label(self) -> str:
+        """Return the name of the treatment in a picture."""
+        if self.treatment.startswith("event"):
+            return _ORDERS.get(self.rows, self.rows)
+        return f"{self.treatment.split(', ')[1].split(' (')[0]}:\n{self.rows}"
+
 
 def outcomes(numbers: Table, problem: str) -> list[Outcome]:
     """Return the outcomes of one problem from the table, which has a row per ball."""
@@ -169,86 +175,50 @@ def outcomes(numbers: Table, problem: str) -> list[Outcome]:
 @recipe("linked-impacts", "mechanics/linked impacts")
 def linked_impacts(numbers: Table) -> Drawn:
     """Draw both problems, and the velocity of the last ball of cradles of several lengths."""
-    cradle, bernoulli = outcomes(numbers, CRADLE), _without_twins(outcomes(numbers, BERNOULLI))
-    panels = (
-        Panel(_cradle(cradle), _words(cradle), "Newton's cradle of five: velocities after", wide=True),
-        Panel(_bernoulli(bernoulli), _words(bernoulli), "Bernoulli's three balls: velocities after", wide=True),
-        Panel(_last_ball(numbers), "Velocity of the last ball of cradles of 2 to 7 balls, by treatment.",
-              "Cradles of two to seven balls: what the last ball gets"),
-    )  # fmt: skip
+    panels = []
+    for problem, title in ((CRADLE, "Newton's cradle of five"), (BERNOULLI, "Bernoulli's three balls")):
+        found: dict[Any, Outcome] = {}
+        for outcome in outcomes(numbers, problem):  # one picture of a treatment and its velocities for both choices
+            key = (outcome.treatment, tuple(round(v, 9) + 0.0 for ball in outcome.velocity for v in ball))
+            rows = f"{found[key].rows.split()[0]} or {outcome.rows}" if key in found else outcome.rows
+            found[key] = outcome._replace(rows=rows)
+        lost = sum(abs(outcome.momentum) > ROUNDING for outcome in found.values())
+        words = (f"{len(found)} outcomes of one impact; {len(found) - lost} conserve energy and momentum, {lost} by "
+                 "per-body rows conserve energy only.")  # fmt: skip
+        panels.append(Panel(_balls(problem, list(found.values())), words, f"{title}: velocities after", wide=True))
+    panels.append(Panel(_last_ball(numbers), "Velocity of the last ball of cradles of 2 to 7 balls, by treatment.",
+                        "Cradles of two to seven balls: what the last ball gets"))
     return Drawn(panels, numbers, {look.name: look for look in TREATMENTS.values()})
 
 
-def _without_twins(found: Sequence[Outcome]) -> list[Outcome]:
-    """Merge outcomes of the same treatment with equal velocities into one, under the names of both row choices."""
-    kept: dict[Any, Outcome] = {}
-    for outcome in found:
-        key = (outcome.treatment, tuple(round(v, 9) + 0.0 for ball in outcome.velocity for v in ball))
-        twin = kept.get(key)
-        kept[key] = outcome if twin is None else twin._replace(rows=f"{twin.rows.split()[0]} or {outcome.rows}")
-    return list(kept.values())
+# problem -> places of its balls, width and height of a picture (in radii, about the first ball), pictures in a row
+_PLACES = {
+    CRADLE: ([(k, 0.0) for k in range(5)], (-1.6, 6.2), (-1.5, 1.6), 3),
+    BERNOULLI: ([(0.0, 0.0), (0.75**0.5, 0.5), (0.75**0.5, -0.5)], (-2.0, 3.2), (-1.9, 2.1), 4),
+}
 
 
-def _words(found: Sequence[Outcome]) -> str:
-    lost = [outcome for outcome in found if abs(outcome.momentum) > ROUNDING]
-    return (f"{len(found)} outcomes of one impact; {len(found) - len(lost)} conserve energy and momentum, "
-            f"{len(lost)} by per-body rows conserve energy only.")  # fmt: skip
-
-
-def _cradle(found: Sequence[Outcome]) -> str:
-    step, balls = 1.35, range(len(found[0].velocity))
-    with Plot("linked-impacts-cradle", (8.6, 0.52 * (len(found) + 1) + 0.3), bare=True) as plot:
-        axes = plot.axes
-        axes.set(xlim=(-8.6, 12.4), ylim=(-step * len(found) + 0.4, 2.5))
-        for x, text in ((-8.4, "rows taken, or order"), (9.0, "energy"), (11.0, "momentum")):
-            note(axes, (x, 2.2), text, ha="left" if x < 0 else "center", color=MUTED, fontsize=8.5)
-        before = tuple((float(ball == 0), 0.0) for ball in balls)
-        rows = [("before the impact", before, INK), *((_label(each), each.velocity, each.look.color) for each in found)]
-        for number, (label, velocity, color) in enumerate(rows):
-            y = step * (1 - number)
-            note(axes, (-8.4, y), label, ha="left", color=color)
-            _balls(axes, [(1.02 * k, y) for k in balls], velocity, color, 1.7)
-        for number, outcome in enumerate(found):
-            _kept(axes, (9.0, -step * number), outcome.energy)
-            _kept(axes, (11.0, -step * number), outcome.momentum)
-    return plot.svg
-
-
-def _label(outcome: Outcome) -> str:
-    if outcome.treatment.startswith("event"):
-        return _ORDERS.get(outcome.rows, outcome.rows)
-    return f"{outcome.treatment.split(', ')[1].split(' (')[0]}: {outcome.rows}"
-
-
-def _balls(axes: Any, centers: Sequence[tuple[float, float]], velocities: Sequence[tuple[float, float]], color: str,
-           scale: float) -> None:  # fmt: skip
+def _balls(problem: str, found: Sequence[Outcome]) -> str:
+    """Draw the balls of each outcome with their velocities, its name above, and what it changes below."""
     from matplotlib.patches import Circle
 
-    for center, velocity in zip(centers, velocities, strict=True):
-        axes.add_patch(Circle(center, _RADIUS, facecolor=PAPER, edgecolor=MUTED, linewidth=1.0, zorder=2))
-        if max(abs(v) for v in velocity) > ROUNDING:
-            arrow(axes, center, [scale * v for v in velocity], color=color, width=1.8, head=10.0)
-
-
-def _kept(axes: Any, place: tuple[float, float], change: float, kept: str = "kept", **how: Any) -> None:
-    """Write that a quantity is kept, or its relative change."""
-    if abs(change) < ROUNDING:
-        note(axes, place, kept, color=INK, **how)
-    else:
-        what = "momentum " if kept != "kept" else ""
-        note(axes, place, f"{what}changed ×{change:.2g}", color=FORCE, fontweight="bold", **how)
-
-
-def _bernoulli(found: Sequence[Outcome]) -> str:
-    half, columns = 0.75**0.5, -(-len(found) // 2)
-    centers = ((0.0, 0.0), (2 * _RADIUS * half, _RADIUS), (2 * _RADIUS * half, -_RADIUS))
-    frames = [(k % columns / columns, 0.5 * (1 - k // columns), 1.0 / columns, 0.5) for k in range(len(found))]
-    with Plot("linked-impacts-bernoulli", (8.6, 4.3), bare=True, frames=frames) as plot:
+    centers, across, up, columns = _PLACES[problem]
+    rows = -(-len(found) // columns)
+    height = 8.6 / columns * (up[1] - up[0]) / (across[1] - across[0])
+    frames = [(k % columns / columns, 1 - (1 + k // columns) / rows, 1 / columns, 1 / rows) for k in range(len(found))]
+    with Plot(f"linked-impacts-{problem.split()[0].lower()}", (8.6, height * rows), bare=True, frames=frames) as plot:
         for axes, outcome in zip(plot.each, found, strict=True):
-            axes.set(xlim=(-2.0, 3.2), ylim=(-1.9, 2.1), aspect="equal")
-            _balls(axes, centers, outcome.velocity, outcome.look.color, 1.6)
-            note(axes, (0.6, 1.65), _label(outcome).replace(": ", ":\n"), color=outcome.look.color, fontsize=8.5)
-            _kept(axes, (0.6, -1.6), outcome.momentum, "all kept", fontsize=8.5)
+            axes.set(xlim=across, ylim=up)
+            color, middle = outcome.look.color, sum(across) / 2
+            for center, velocity in zip(centers, outcome.velocity, strict=True):
+                axes.add_patch(Circle(center, 0.5, facecolor=PAPER, edgecolor=MUTED, linewidth=1.0, zorder=2))
+                if max(abs(v) for v in velocity) > ROUNDING:
+                    arrow(axes, center, [1.6 * v for v in velocity], color=color, width=1.8, head=10.0)
+            note(axes, (middle, up[1] - 0.45), outcome.label, color=color, fontsize=8.5)
+            changed = [f"{name} changed ×{change:.2g}" for name, change in zip(("energy", "momentum"), outcome[3:],
+                       strict=True) if abs(change) >= ROUNDING]  # fmt: skip
+            note(axes, (middle, up[0] + 0.3), ", ".join(changed) or "all kept", color=FORCE if changed else INK,
+                 fontsize=8.5, fontweight="bold" if changed else "normal")  # fmt: skip
     return plot.svg
 
 

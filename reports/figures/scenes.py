@@ -13,7 +13,6 @@ from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.geometry import (
     Floats,
-    Placement,
     View,
     body_placements,
     bounds,
@@ -165,16 +164,9 @@ SIGHTS = (
 )
 
 
-@dataclass(frozen=True)
-class Piece:
-    """A ring or line of points (n, 3) [m] to draw; bodies hide 70 % of what lies behind them."""
-
-    points: Floats
-    nearness: float  # what is nearer to the reader is drawn later
-    face: str = PEG
-    edge: str = INK
-    width: float = 0.9
-    alpha: float = 0.7
+Piece = tuple[float, Floats, dict[str, Any]]  # nearness to the reader, points (n, 3) [m] of a ring or line, and look
+_BODY = {"facecolor": PEG, "edgecolor": INK, "linewidth": 0.9, "alpha": 0.7}  # hides 70 % of what lies behind it
+_STATIC = _BODY | {"facecolor": WALL, "edgecolor": MUTED, "alpha": 0.35}
 
 
 @recipe("scenes-space", *(sight.run for sight in SIGHTS))
@@ -184,18 +176,17 @@ def scenes_space(*runs: Run) -> Drawn:
     for sight, run in zip(SIGHTS, runs, strict=True):
         scene, flat = run.scene_resolved, sight.seen.flat
         steps = [round(share * run.steps) for share in sight.moments]
-        drawn = [sorted(_pieces(sight, scene, run.pose[step]), key=lambda piece: piece.nearness) for step in steps]
-        low, high = bounds([flat(piece.points) for each in drawn for piece in each], _MARGIN)
+        drawn = [sorted(_pieces(sight, scene, run.pose[step]), key=lambda piece: piece[0]) for step in steps]
+        low, high = bounds([flat(points) for each in drawn for _, points, _ in each], _MARGIN)
         for step, each in zip(steps, drawn, strict=True):
             with Canvas(f"scenes-space-{run.scene_name}-{step}", low, high, PANEL) as canvas:
-                for order, piece in enumerate(each):
-                    x, y, over = *flat(piece.points).T, {"zorder": 2 + 1e-3 * order}
-                    if len(x) == 2:
-                        canvas.axes.plot(x, y, color=piece.edge, linewidth=piece.width, **over)
-                        continue
-                    canvas.axes.fill(x, y, facecolor=piece.face, edgecolor="none", alpha=piece.alpha, **over)
-                    canvas.axes.fill(x, y, facecolor="none", edgecolor=piece.edge, linewidth=piece.width,
-                                     joinstyle="round", **over)  # fmt: skip
+                for order, (_, points, look) in enumerate(each):  # what is nearer is drawn later
+                    place, look = flat(points).T, look | {"zorder": 2 + 1e-3 * order}
+                    if len(points) == 2:
+                        canvas.axes.plot(*place, **look)
+                    else:
+                        canvas.axes.fill(*place, **look | {"edgecolor": "none"})
+                        canvas.axes.fill(*place, **look | {"facecolor": "none", "alpha": None}, joinstyle="round")
                 canvas.hand(scene, run.pose[step], 0.16 * float(max(high - low)), flat)
             moment = f"{run.time[step]:.2f} s"
             panels.append(Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.",
@@ -206,30 +197,29 @@ def scenes_space(*runs: Run) -> Drawn:
 def _pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Piece]:
     """Yield the faces, discs and lines of a scene at a pose that face the reader."""
     seen, places = sight.seen, body_placements(scene, pose)
-    shapes: list[tuple[Placement, Mapping[str, Any], dict[str, Any]]] = [
-        (places[body["name"]] @ placement_of(shape), shape, {})
-        for body in scene["bodies"] for shape in body["shapes"]]
+    shapes = [(places[body["name"]] @ placement_of(shape), shape, _BODY)
+              for body in scene["bodies"] for shape in body["shapes"]]  # fmt: skip
     for wall in scene["walls"]:
         if wall["kind"] != "half_space":
             wall = _cut(wall, sight.walls_around)
-            shapes.append((placement_of(wall), wall, {"face": WALL, "edge": MUTED, "alpha": 0.35}))
+            shapes.append((placement_of(wall), wall, _STATIC))
         elif sight.floor:  # a square, moved to the reach of an arm, x > 0
-            square = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
-            yield Piece(plane_frame(wall).of(sight.floor * square) + [0.7 * sight.floor, 0.0, 0.0], -np.inf, RULE,
-                        MUTED, 0.6, 1.0)  # fmt: skip
+            square = sight.floor * (np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]]))
+            yield -np.inf, plane_frame(wall).of(square) + [0.7 * sight.floor, 0.0, 0.0], {
+                "facecolor": RULE, "edgecolor": MUTED, "linewidth": 0.6, "alpha": 1.0}
     for line in links(scene, pose):
-        yield Piece(np.array(line), seen.depth(line), edge=LINK, width=4.0)
+        yield seen.depth(line), np.array(line), {"color": LINK, "linewidth": 4.0}
     for body in scene["bodies"]:
         if not body["shapes"] and body["joint"] == "free_flyer":
-            size, center = cuboid_of_inertia(body), np.asarray(body["center_of_mass"], dtype=float)
-            own = places[body["name"]] @ placement(center)
-            shapes.append((own, {"kind": "box", "size": size}, {}))
-            yield Piece(seen.disc(own.of(size / 2.0), _MARK * max(size)), np.inf, FORCE, FORCE, 0.5, 1.0)
+            size, own = cuboid_of_inertia(body), places[body["name"]] @ placement(body["center_of_mass"])
+            shapes.append((own, {"kind": "box", "size": size}, _BODY))
+            yield np.inf, seen.disc(own.of(size / 2.0), _MARK * max(size)), {
+                "facecolor": FORCE, "edgecolor": FORCE, "linewidth": 0.5, "alpha": 1.0}
     for own, shape, look in shapes:
         rings = [seen.disc(own.origin, shape["radius"])] if shape["kind"] == "sphere" else [
             ring for ring in cuboid("", own, shape["size"]).sides if seen.faces_reader(ring)]  # fmt: skip
         for ring in rings:
-            yield Piece(ring, seen.depth(own.origin), **look)
+            yield seen.depth(own.origin), ring, look
 
 
 def _cut(wall: Mapping[str, Any], reach: float) -> Mapping[str, Any]:

@@ -16,8 +16,8 @@ from markupsafe import Markup
 
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
-from reports.figures.figure import Figure, NotComputed, Recipe, draw, swatch
-from reports.figures.numbers import format_cell, format_number, is_number
+from reports.figures.figure import Figure, Recipe, draw, swatch
+from reports.figures.numbers import format_cell, is_number
 from reports.pages.first import answer, facts
 from reports.pages.formulas import formula, prose
 from reports.pages.matrix import matrices, worst_first
@@ -47,7 +47,7 @@ def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dic
     nor script.
     """
     inputs = figure_inputs(evidence)
-    figures: dict[str, list[Figure | NotComputed]] = {}
+    figures: dict[str, list[Figure]] = {}
     for recipe in recipes:
         figures.setdefault(recipe.section, []).append(draw(recipe, inputs))
     environment = _environment()
@@ -113,7 +113,7 @@ def map_of(claim: Finding) -> Figure | None:
     if not claim.axes or claim.verdict == REPRODUCED or table is None or not table.rows:
         return None
     caption = f"Each mark is one simulated condition of {claim.key}."
-    return _map(f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes)
+    return condition_map(f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes)
 
 
 def first_map(claims: Sequence[Finding]) -> Figure | None:
@@ -129,22 +129,14 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
         f"the ideal world. A cross: PB or CBuc is closer. IAPB is closest in {', '.join(counts)}, mostly at small "
         "tilts. The picture above starts at a tilt of 0.015 rad, the largest of that region."
     )
-    return _map("where-c10", "Where IAPB is the closest", caption, grid, "tilt", "clearance", "coordinate", ranked=True)
+    return condition_map("where-c10", "Where IAPB is the closest", caption, grid, "tilt", "clearance", "coordinate",
+                         ranked=True)
 
 
-def _map(key: str, title: str, caption: str, table: Table, x: str, y: str, *split: str, ranked: bool = False) -> Figure:
-    """Draw the outcomes over the columns x and y, in one panel for every combination of the columns in `split`."""
-    titles = {column.key: column.title for column in table.columns}
-    panels = [", ".join(row[name] if isinstance(row[name], str) else f"{titles[name]}: {row[name]:g}" for name in split)
-              for row in table.records()]  # fmt: skip
-    return condition_map(key, title, caption, (titles[x], table.column(x)), (titles[y], table.column(y)), table.holds,
-                         panels, ranked)  # fmt: skip
-
-
-def played(figures: Mapping[str, Sequence[Figure | NotComputed]]) -> dict[str, str]:
+def played(figures: Mapping[str, Sequence[Figure]]) -> dict[str, str]:
     """Return the key of the figure that plays each run, by the input name of the run."""
-    drawn = [figure for group in figures.values() for figure in group if isinstance(figure, Figure)]
-    return {name: figure.key for figure in drawn if figure.panels and figure.panels[0].film for name in figure.inputs}
+    return {name: figure.key for group in figures.values() for figure in group
+            if figure.panels and figure.panels[0].film for name in figure.inputs}  # fmt: skip
 
 
 def badge_words(topic: Finding) -> str:
@@ -165,9 +157,9 @@ def counted(part: Part) -> str:
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 
-def tables_without(topic: Finding, figures: Sequence[Figure | NotComputed]) -> tuple[tuple[str, Table], ...]:
+def tables_without(topic: Finding, figures: Sequence[Figure]) -> tuple[tuple[str, Table], ...]:
     """Return the names and tables of a topic that are not drawn in a figure."""
-    drawn = {name for figure in figures if isinstance(figure, Figure) for name in figure.inputs}
+    drawn = {name for figure in figures for name in figure.inputs}
     return tuple((name, table) for name, table in topic.tables.items() if f"{topic.key}/{name}" not in drawn)
 
 
@@ -177,14 +169,14 @@ def _environment() -> Environment:
         trim_blocks=True, lstrip_blocks=True,
     )
     environment.filters.update(
-        cell=format_cell, number=format_number, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
+        cell=format_cell, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
         as_finding=FINDINGS.__getitem__, badge_words=badge_words, counted=counted, tables_without=tables_without,
         runs_by_user=runs_by_user, anchor=anchor,
         matrices=matrices, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals["rows_shown"] = ROWS_SHOWN
-    environment.tests.update(numeric=is_number, drawn=lambda figure: isinstance(figure, Figure))
+    environment.tests["numeric"] = is_number
     return environment
 
 

@@ -5,10 +5,10 @@ Each sentence is made from findings; a sentence whose findings were not computed
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from math import degrees
 from statistics import median
+from typing import NamedTuple
 
 from reports.pages.quantities import PEG_STEP, peg_step
 from reports.pages.records import Evidence
@@ -25,21 +25,16 @@ MISSES_SHOWN = 5
 GRAVEST = ("exact-energy", "hard-cases", "engines", "scene-ledger", "complementarity", "stability", "mechanics")
 
 
-@dataclass(frozen=True)
-class Fact:
-    """A line beside the answer; `id` links to its details in the report.
-
-    items : lines of a list, each with the id of its details
-    """
+class Fact(NamedTuple):
+    """A line beside the answer; `id` links to its details; `items` are lines of a list, each with its own id."""
 
     label: str
     text: str
     id: str
-    items: tuple[tuple[str, str], ...] = ()
+    items: Sequence[tuple[str, str]] = ()
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What holds and what fails of the paper's main claim, in sentences; "" if nothing is known."""
 
     holds: str
@@ -106,24 +101,15 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
 
 
 def _misses(topics: tuple[Finding, ...]) -> Fact:
-    """Return the most serious failing topics, one line each; the others are listed further down the page."""
-    answered = [topic for topic in topics if topic.answer]
-    missed = sorted((topic for topic in answered if topic.verdict in (MIXED, REFUTED)), key=_gravity)
-    lines = [(_line(topic), topic.key) for topic in missed]
-    rest = len(lines) - MISSES_SHOWN
-    shown = (*lines[:MISSES_SHOWN], *([(f"and {rest} more", "asked")] if rest > 0 else ()))
+    """Return the most serious failing topics, one line each: its first failure and the number of further ones."""
+    answered, lines = [topic for topic in topics if topic.answer], []
+    for topic in sorted(answered, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
+        if topic.verdict in (MIXED, REFUTED):
+            clauses = [part.miss for part in topic.parts if part.miss] or [f"{topic.title}: {topic.verdict}"]
+            more = f", and {len(clauses) - 1} more" if len(clauses) > 1 else ""
+            lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
+    rest = [(f"and {len(lines) - MISSES_SHOWN} more", "asked")] if len(lines) > MISSES_SHOWN else []
     lacking = [topic.title for topic in answered if topic.verdict == NOT_COMPUTED]
-    said = ["Every finding of ours holds."] if not missed and not lacking else []
-    said += [f"Not computed: {', '.join(lacking)}."] if lacking else []
-    return Fact("What we miss", " ".join(said), "asked", items=shown)
-
-
-def _gravity(topic: Finding) -> int:
-    return GRAVEST.index(topic.key) if topic.key in GRAVEST else len(GRAVEST)
-
-
-def _line(topic: Finding) -> str:
-    """Return the first failure of a topic and the number of further ones; its verdict if no part names a failure."""
-    clauses = [part.miss for part in topic.parts if part.miss] or [f"{topic.title}: {topic.verdict}"]
-    more = f", and {len(clauses) - 1} more" if len(clauses) > 1 else ""
-    return clauses[0][:1].upper() + clauses[0][1:] + more
+    said = "" if lines or lacking else "Every finding of ours holds."
+    return Fact("What we miss", f"Not computed: {', '.join(lacking)}." if lacking else said, "asked",
+                lines[:MISSES_SHOWN] + rest)  # fmt: skip

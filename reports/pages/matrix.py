@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from reports.figures.numbers import power_of_ten
@@ -22,37 +21,29 @@ KINDS = {"impact": "Impacts, by method", "motion": "Motions, by world"}
 Row = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Matrix:
-    """The matrix of one kind of case. Each row is a case and, for each of the `methods`, a cell.
-
-    A cell is (mark, class, words, decade).
-    """
-
-    title: str
-    methods: tuple[str, ...]
-    rows: tuple[tuple[str, tuple[tuple[str, str, str, str] | None, ...]], ...]
+# (title, methods, rows); each row is a case and, for each method, a cell: (mark, class, words, decade)
+Matrix = tuple[str, list[str], list[tuple[str, list[tuple[str, str, str, str] | None]]]]
 
 
-def matrices(numbers: Table) -> tuple[Matrix, ...]:
+def matrices(numbers: Table) -> list[Matrix]:
     """Return a matrix of the impacts and one of the motions, from a table with a row per case and method."""
-    return tuple(_matrix(title, rows) for kind, title in KINDS.items() if (rows := numbers.where(kind=kind).records()))
+    found: list[Matrix] = []
+    for kind, title in KINDS.items():
+        cases: dict[str, dict[str, Row]] = {}
+        for row in numbers.where(kind=kind).records():
+            cases.setdefault(row["case"], {})[row["method"]] = row
+        methods = sorted({name for row in cases.values() for name in row}, key=lambda name: (name not in ENGINE, name))
+        order = sorted(cases, key=lambda case: _rank(tuple(cases[case].values())))
+        if cases:
+            found.append((title, methods, [(case, [_cell(cases[case].get(method)) for method in methods])
+                                           for case in order]))  # fmt: skip
+    return found
 
 
 def worst_first(cases: Sequence[Finding]) -> list[Finding]:
     """Return the cases in the order of the matrix; cases without a table are last."""
     rows = {case.key: case.tables[case.key].records() for case in cases if case.key in case.tables}
     return sorted(cases, key=lambda case: _rank(rows[case.key]) if case.key in rows else (9, 0.0, 0))
-
-
-def _matrix(title: str, rows: Sequence[Row]) -> Matrix:
-    cases: dict[str, dict[str, Row]] = {}
-    for row in rows:
-        cases.setdefault(row["case"], {})[row["method"]] = row
-    methods = tuple(sorted({row["method"] for row in rows}, key=lambda name: (name not in ENGINE, name)))
-    order = sorted(cases, key=lambda case: _rank(tuple(cases[case].values())))
-    return Matrix(title, methods, tuple((case, tuple(_cell(cases[case].get(method)) for method in methods))
-                                        for case in order))  # fmt: skip
 
 
 def _rank(rows: Sequence[Row]) -> tuple[int, float, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from reports.pages.records import Evidence
@@ -10,18 +9,20 @@ from reports.pages.records import Evidence
 
 @dataclass(frozen=True)
 class Section:
-    """A section. `ready` returns whether there is evidence to show; if not, the page says that it was not computed.
+    """A section.
 
     group : heading in the contents
+    needs : field of Evidence, or key of a topic, without which the page says that it was not computed
     tables : names of the manifest's tables that store the section's numbers
+    topic : whether it is drawn from a Finding, by the template that all of them share
     """
 
     group: str
     id: str
     title: str
-    ready: Callable[[Evidence], bool]
-    topic: bool = False  # drawn from a Finding, by the template that all of them share
+    needs: str = ""
     tables: tuple[str, ...] = ()
+    topic: bool = False
 
     @property
     def page(self) -> str:
@@ -32,40 +33,35 @@ class Section:
     def template(self) -> str:
         return "topic.html.j2" if self.topic else f"{self.id}.html.j2"
 
-
-def _always(_: Evidence) -> bool:
-    return True
-
-
-def _has(key: str) -> Callable[[Evidence], bool]:
-    return lambda evidence: any(topic.key == key for topic in evidence.topics)
+    def ready(self, evidence: Evidence) -> bool:
+        """Return whether there is evidence to show."""
+        return (not self.needs or bool(getattr(evidence, self.needs, ()))
+                or any(topic.key == self.needs for topic in evidence.topics))  # fmt: skip
 
 
 def _topic(group: str, id: str, title: str) -> Section:
-    return Section(group, id, title, _has(id), True, (id,))
+    return Section(group, id, title, id, (id,), topic=True)
 
 
 PAPER, ENERGY, CHECKS, TIME, DATA = "The paper", "Energy", "Is it right?", "Time and effects", "Make it again"
 SECTIONS: tuple[Section, ...] = (
-    Section(PAPER, "idea", "The idea", _always),
-    Section(PAPER, "claims", "Claims ledger", lambda evidence: bool(evidence.claims),
-            tables=("claims", "claims on the peg", "claims on times")),
-    Section(PAPER, "figures", "Figures of the paper", _always, tables=("runs of the figures",)),
-    Section(PAPER, "couplings", "Device and tool", _always),
-    Section(ENERGY, "proofs", "Proofs", lambda evidence: bool(evidence.proofs), tables=("proofs",)),
-    Section(ENERGY, "properties", "Properties", _has("properties"),
-            tables=("properties", "counterexamples", "energy-gains")),
+    Section(PAPER, "idea", "The idea"),
+    Section(PAPER, "claims", "Claims ledger", "claims", ("claims", "claims on the peg", "claims on times")),
+    Section(PAPER, "figures", "Figures of the paper", "", ("runs of the figures",)),
+    Section(PAPER, "couplings", "Device and tool"),
+    Section(ENERGY, "proofs", "Proofs", "proofs", ("proofs",)),
+    Section(ENERGY, "properties", "Properties", "properties", ("properties", "counterexamples", "energy-gains")),
     _topic(ENERGY, "exact-energy", "Exact energy"),
     _topic(CHECKS, "mechanics", "Linkages and free bodies"),
     _topic(CHECKS, "scene-ledger", "The scenes"),
     _topic(CHECKS, "complementarity", "Against complementarity"),
-    Section(CHECKS, "hard-cases", "Hard cases", lambda evidence: bool(evidence.hard_cases), tables=("hard cases",)),
+    Section(CHECKS, "hard-cases", "Hard cases", "hard_cases", ("hard cases",)),
     _topic(CHECKS, "stability", "Stability of contact"),
     _topic(CHECKS, "engines", "Other engines"),
-    Section(TIME, "accuracy", "Accuracy against time", _always, tables=("accuracy",)),
+    Section(TIME, "accuracy", "Accuracy against time", "", ("accuracy",)),
     _topic(TIME, "haptic-rate", "The haptic rate"),
-    Section(TIME, "effects", "Effects", lambda evidence: bool(evidence.effects), tables=("effects",)),
+    Section(TIME, "effects", "Effects", "effects", ("effects",)),
     _topic(DATA, "survival", "Runs that survive"),
-    Section(DATA, "provenance", "Provenance", lambda evidence: bool(evidence.provenance)),
-    Section(DATA, "manifest", "Manifest", lambda evidence: bool(evidence.manifest)),
+    Section(DATA, "provenance", "Provenance", "provenance"),
+    Section(DATA, "manifest", "Manifest", "manifest"),
 )

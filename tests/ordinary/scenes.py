@@ -18,6 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from iapb.scene.mechanism import mechanism_of, start_of
+from iapb.scene.model import scene_kind
+from reference.rigid_body import model_of
+
 Floats = NDArray[np.float64]
 Numbers = tuple[float, ...]
 Values = dict[str, Any]  # a scene, a body or a wall as it stands in a scene file
@@ -163,68 +167,26 @@ def points(motion: Motion, arm: float, axes: slice = slice(None)) -> Floats:
 # Truth of what touches nothing: Pinocchio's forward dynamics, integrated by DOP853
 
 
-def _model(values: Values) -> Any:
-    """Return the scene as a model of Pinocchio; its coordinates and velocities are those of the scene."""
-    import pinocchio as pin
-
-    model, index = pin.Model(), {"world": 0}
-    down = values.get("gravity", [0.0, 0.0, 0.0])
-    model.gravity.linear = np.array([*down, 0.0][:3])
-    for body in values["bodies"]:
-        joint = {"free_flyer": pin.JointModelFreeFlyer, "spherical": pin.JointModelSpherical}.get(body["joint"])
-        axis = np.array([*body.get("axis", [0, 0, 1]), 0.0][:3])
-        axis = axis / np.linalg.norm(axis)
-        kind = (joint() if joint else pin.JointModelRevoluteUnaligned(axis) if body["joint"] == "revolute"
-                else pin.JointModelPrismaticUnaligned(axis))  # fmt: skip
-        origin = np.array([*body.get("origin", [0.0, 0.0]), 0.0][:3])
-        index[body["name"]] = here = model.addJoint(
-            index[body.get("parent", "world")], kind, pin.SE3(np.eye(3), origin), body["name"])
-        inertia = np.diag(np.broadcast_to(body.get("inertia", 0.0), 3)).astype(float)
-        center = np.array([*body.get("center_of_mass", [0.0, 0.0]), 0.0][:3])
-        model.appendBodyToJoint(here, pin.Inertia(body["mass"], center, inertia), pin.SE3.Identity())
-    return model
-
-
-def _rates(model: Any, q: Floats, v: Floats) -> Floats:
-    """Return dq/dt: quaternions and places of free bodies turn with velocities in body axes."""
-    import pinocchio as pin
-
-    rates = []
-    for joint in model.joints[1:]:
-        at, speed = q[joint.idx_q : joint.idx_q + joint.nq], v[joint.idx_v : joint.idx_v + joint.nv]
-        if joint.nq == joint.nv:
-            rates.append(speed)
-            continue
-        turn = pin.Quaternion(at[-4:] / np.linalg.norm(at[-4:]))
-        if joint.nq == 7:
-            rates.append(turn.matrix() @ speed[:3])
-        rates.append(0.5 * (turn * pin.Quaternion(np.array([*speed[-3:], 0.0]))).coeffs())
-    return np.concatenate(rates)
-
-
 @lru_cache(maxsize=64)
 def free_motion(name: str) -> Motion:
     """Return the true motion of a case without contact, at a hundred instants."""
-    import pinocchio as pin
-
-    values = CASES[name].scene
-    model = _model(values)
-    state = model.createData()
-    start = [np.array([x for body in values["bodies"] for x in body[part]], float) for part in ("position", "velocity")]
+    checked = scene_kind(CASES[name].scene).model_validate(CASES[name].scene)
+    mechanics = model_of(mechanism_of(checked))
+    pin, model, state, nq = mechanics.pin, mechanics.model, mechanics.data, mechanics.nq
+    model.gravity.linear = np.array([*(checked.gravity or ()), 0.0, 0.0, 0.0][:3])
 
     def rates(_: float, y: Floats) -> Floats:
-        q, v = pin.normalize(model, y[: model.nq]), y[model.nq :]
-        return np.concatenate([_rates(model, q, v), pin.aba(model, state, q, v, np.zeros(model.nv))])
+        q, v = mechanics.normalize(y[:nq]), y[nq:]
+        return np.concatenate([mechanics.rate(q, v), pin.aba(model, state, q, v, np.zeros(mechanics.nv))])
 
-    times = np.linspace(0.0, values["duration"], 101)
-    found = solve_ivp(rates, (0.0, times[-1]), np.concatenate(start), "DOP853", times, rtol=1e-12, atol=1e-12).y.T
-    place, turn, spin = [], [], []
-    for y in found:
-        pin.forwardKinematics(model, state, pin.normalize(model, y[: model.nq]))
-        place.append([frame.translation for frame in state.oMi[1:]])
-        turn.append([frame.rotation for frame in state.oMi[1:]])
-        spin.append(turn[-1][0] @ y[model.nq + 3 : model.nq + 6] if model.joints[1].nv == 6 else np.zeros(3))
-    return Motion(times, *(np.array(part) for part in (place, turn, spin)))
+    times = np.linspace(0.0, checked.duration, 101)
+    found = solve_ivp(rates, (0.0, times[-1]), np.concatenate(start_of(checked)), "DOP853", times, rtol=1e-12,
+                      atol=1e-12).y.T  # fmt: skip
+    turn, place = (np.array(part)[:, :-1] for part in zip(*(mechanics.bodies(mechanics.normalize(y[:nq]))[:2]
+                                                            for y in found), strict=True))  # fmt: skip
+    free = checked.bodies[0].joint == "free_flyer"
+    spin = np.einsum("nij,nj->ni", turn[:, 0], found[:, nq + 3 : nq + 6]) if free else np.zeros((len(times), 3))
+    return Motion(times, place, turn, spin)
 
 
 def add_free(name: str, values: Values, arm: float, tolerance: float = 0.01, axes: slice = slice(None)) -> None:

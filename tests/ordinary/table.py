@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,8 +27,6 @@ from tests.ordinary.scenes import CASES, Case, Floats, Motion
 WORLDS = ("IAPB", "IAPB-friction", "PB", "ideal", "ideal-friction", "MuJoCo")
 SLOW = ("ideal", "ideal-friction")  # they are timed for a few steps first
 LONGEST = 100.0  # [s] of one case in one world
-VERDICTS = ("right", "flagged", "wrong", "ignores", "unrun")
-LEVEL = 1e-3  # of the tolerance: errors closer than this are level
 
 
 class Outcome(NamedTuple):
@@ -217,8 +216,8 @@ def _geom(shape: Any, depth: float, meshes: list[str]) -> str:
 # The table
 
 
-def table(names: list[str], worlds: list[str], longest: float) -> dict[str, dict[str, Outcome]]:
-    """Run the cases, print a line for each and what they come to, and return the outcomes by case and world."""
+def table(names: list[str], worlds: list[str], longest: float) -> None:
+    """Run the cases, and print errors and verdicts, energy made, the verdicts of each world, and why runs stopped."""
     found: dict[str, dict[str, Outcome]] = {}
     print(f"{'error / tolerance':26s} {'tolerance':>9s}" + "".join(f"{world:>18s}" for world in worlds))
     for name in names:
@@ -229,25 +228,11 @@ def table(names: list[str], worlds: list[str], longest: float) -> dict[str, dict
     print(f"\n{'energy made / energy':36s}" + "".join(f"{world:>15s}" for world in worlds))
     for name, row in found.items():
         print(f"{name:36s}" + "".join(f"{each.made:15.1e}" for each in row.values()))
-    print("\n" + "\n".join(summary(found, world) for world in worlds))
+    for world in worlds:
+        counts = Counter(row[world].verdict(CASES[name]) for name, row in found.items())
+        print(f"{world:15s} of {len(found)}: " + ", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     whys = ((name, world, each.why) for name, row in found.items() for world, each in row.items() if each.why)
     print("".join(f"\n{name}, {world}: {why}" for name, world, why in whys))
-    return found
-
-
-def summary(found: dict[str, dict[str, Outcome]], world: str) -> str:
-    """Return what the cases of a world come to, in one line."""
-    verdicts = [row[world].verdict(CASES[name]) for name, row in found.items()]
-    line = f"{world:15s} of {len(found)}: " + ", ".join(f"{verdicts.count(x)} {x}" for x in VERDICTS if x in verdicts)
-    if world == "MuJoCo" or not all("MuJoCo" in row for row in found.values()):
-        return line
-    counts = dict.fromkeys(("closer", "level", "farther"), 0)
-    for (name, row), verdict in zip(found.items(), verdicts, strict=True):
-        ours, theirs = row[world].error, row["MuJoCo"].error
-        level = ours == theirs or abs(ours - theirs) <= LEVEL * CASES[name].tolerance
-        if verdict not in ("ignores", "unrun"):
-            counts["level" if level else "closer" if ours < theirs else "farther"] += 1
-    return line + "; beside MuJoCo " + ", ".join(f"{count} {word}" for word, count in counts.items())
 
 
 def main() -> None:

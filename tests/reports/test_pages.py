@@ -15,7 +15,7 @@ import pytest
 
 from iapb.errors import ArgumentError
 from reports import report
-from reports.figures.figure import Cell, Figure, Panel, Recipe, grid
+from reports.figures.figure import Figure, Panel, Recipe, cell, grid
 from reports.figures.paper import arm_energies
 from reports.pages.builder import FIRST_PAGE, ROWS_SHOWN, badge_words, build_report, link_across
 from reports.pages.first import LIMIT, MISSES_SHOWN, Answer, answer, facts
@@ -180,7 +180,7 @@ def test_powers_of_ten_read_as_people_write_them(text: str, shown: str) -> None:
 
 
 def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_table_is_a_table() -> None:
-    panel = Panel(grid(("a",), {"row": [Cell("x")]}), 'says "x"')
+    panel = Panel(grid(("a",), {"row": [cell("x")]}), 'says "x"')
     drawn = Figure("t", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
     page = build_report(Evidence(manifest=RUNS), [Recipe("t", "", "", (), lambda _: drawn, "accuracy")])
     assert '<table aria-label="says &#34;x&#34;" class="grid' in page["report/accuracy.html"]

@@ -53,6 +53,4 @@ def test_every_scene_and_every_run_of_the_figures_has_a_command_and_a_scene_of_o
 def test_runs_stand_under_each_of_their_users():
     files = [StoredFile(name, f"runs/{name}.h5", "k", "c", "iapb run", 10, users, status)
              for name, users, status in (("a", ("C07", "C10"), "complete"), ("b", ("C10",), "absent"), ("t", (), ""))]
-    first, second = runs_by_user(files)
-    assert (first.user, len(first.runs), first.missing) == ("C07", 1, 0)
-    assert (second.user, len(second.runs), second.size, second.missing) == ("C10", 2, 20, 1)
+    assert runs_by_user(files) == {"C07": files[:1], "C10": files[:2]}
