@@ -76,39 +76,31 @@ def _first_shown(runs: Mapping[str, Run], before: float) -> int:
 
 def _trajectories(key: str, runs: Mapping[str, Run], names: Mapping[str, str]) -> tuple[list[Panel], Table]:
     """Draw the path and the three coordinates; for limited devices, also tool against device and penetration."""
-    everyone, over = ", ".join(runs), partial(_over_time, key, runs)
+    over = partial(_over_time, key, runs)
     ends = "; ".join("{} ends at ({:.1f}, {:.1f})".format(curve, *(MILLI * run.device_q[-1, :2]))
                      for curve, run in runs.items())  # fmt: skip
     panels = [Panel(_path(f"{key}-path", runs), f"Paths of the hand in the plane, in mm: {ends}.",
                     "path of the hand, from just before contact")]  # fmt: skip
     for k, (name, unit, factor) in enumerate(_COORDINATES):
-        panels.append(over("xyz"[k], {curve: factor * run.device_q[:, k] for curve, run in runs.items()},
-                           f"{name} [{unit}]", f"{name} over time",
-                           f"{name} of the hand over time in {unit}, for {everyone}."))  # fmt: skip
+        values = {curve: factor * run.device_q[:, k] for curve, run in runs.items()}
+        panels.append(over("xyz"[k], values, f"{name} [{unit}]", f"{name} over time"))
     if "ideal" in runs:
         ideal = runs["ideal"].device_q
-        for which, name, axis, factor in ((slice(0, 2), "position", "distance from ideal [mm]", MILLI),
-                                          (slice(2, 3), "angle", "angle from ideal [°]", DEGREES)):
-            values = {curve: factor * np.linalg.norm(_apart(run.device_q, ideal)[:, which], axis=1)
-                      for curve, run in runs.items() if curve != "ideal"}  # fmt: skip
-            largest = ", ".join(f"{curve} {value.max():.2g}" for curve, value in values.items())
-            panels.append(over(f"off-{name}", values, axis, f"deviation from ideal, {name}",
-                               f"{axis} over time; at most: {largest}."))
+        off = {curve: _apart(run.device_q, ideal) for curve, run in runs.items() if curve != "ideal"}
+        panels += [over("off-position", {curve: MILLI * np.hypot(*path[:, :2].T) for curve, path in off.items()},
+                        "distance from ideal [mm]", "deviation from ideal, position"),
+                   over("off-angle", {curve: DEGREES * np.abs(path[:, 2]) for curve, path in off.items()},
+                        "angle from ideal [°]", "deviation from ideal, angle")]  # fmt: skip
     if names == UNLIMITED:  # beyond the final position in the ideal world, on the axis of the printed Figure 7
         values = {curve: MILLI * (runs["ideal"].device_q[-1, 1] - run.device_q[:, 1]) for curve, run in runs.items()}
-        deepest = ", ".join(f"{curve} {value.min():.2f}" for curve, value in values.items())
         panels.append(over("printed", values, "past the rigid place [mm]",
-                           "depth along y past the rigid place, on the printed range",
-                           f"Depth of the hand past its rigid place along y, in mm; at most: {deepest}.",
-                           height=_PRINTED_RANGE))  # fmt: skip
+                           "depth along y past the rigid place, on the printed range", height=_PRINTED_RANGE))
     if names in (LIMITED, STRATEGIES):
         apart = {curve: MILLI * np.hypot(*(tool_positions(run)[:, :2] - run.device_q[:, :2]).T)
                  for curve, run in runs.items()}  # fmt: skip
         depths = {curve: MILLI * penetration_over_time(run) for curve, run in runs.items()}
-        panels += [over("apart", apart, "distance [mm]", "how far tool and device come apart",
-                        f"Distance between tool and device over time, for {everyone}."),
-                   over("depth", depths, "penetration [mm]", "how deep the virtual peg sinks in",
-                        f"Penetration of the virtual peg over time, for {everyone}.")]  # fmt: skip
+        panels += [over("apart", apart, "distance [mm]", "how far tool and device come apart"),
+                   over("depth", depths, "penetration [mm]", "how deep the virtual peg sinks in")]
     reference = "ideal" if "ideal" in runs else None
     distances = ("distance from ideal: x [mm]", "y [mm]", "θ [°]") if reference else ()
     columns = ("world", *distances, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
@@ -137,8 +129,8 @@ def _path(key: str, runs: Mapping[str, Run], size: tuple[float, float] = PANEL, 
     return plot.svg
 
 
-def _over_time(key: str, runs: Mapping[str, Run], suffix: str, values: Mapping[str, Floats], axis: str, label: str,
-               alt: str, *, height: tuple[float, float] | None = None, first: int = 0, last: int | None = None,
+def _over_time(key: str, runs: Mapping[str, Run], suffix: str, values: Mapping[str, Floats], axis: str, label: str, *,
+               height: tuple[float, float] | None = None, first: int = 0, last: int | None = None,
                **how: Any) -> Panel:  # fmt: skip
     """Draw a quantity of each run over time, from step `first` to step `last`; `height` limits the vertical axis."""
     with Plot(f"{key}-{suffix}", kind=TIME) as plot:
@@ -148,7 +140,8 @@ def _over_time(key: str, runs: Mapping[str, Run], suffix: str, values: Mapping[s
                            markevery=_marks(len(shown), number), zorder=3 + number / 10)
         longest = max((runs[curve] for curve in values), key=lambda run: run.steps)
         plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=(longest.time[first], longest.time[: last][-1]), ylim=height)
-    return Panel(plot.svg, alt, label)
+    ranges = ", ".join(f"{curve} {min(each):.3g} to {max(each):.3g}" for curve, each in values.items())
+    return Panel(plot.svg, f"{axis} over time, in the whole run: {ranges}.", label)
 
 
 def tool_positions(run: Run) -> Floats:
@@ -201,7 +194,6 @@ def _forces(key: str, runs: Mapping[str, Run]) -> tuple[list[Panel], Table]:
         values = {curve: run.device_force[:, k] for curve, run in runs.items()}
         for letter, (view, shown) in zip("cam", views.items(), strict=True):
             panels.append(_over_time(key, runs, f"{k}{letter}", values, f"{name} [{unit}]", f"{title}, {view}",
-                                     f"{name} [{unit}] over time, {view}, for {', '.join(runs)}.",
                                      drawstyle="steps-post", **shown))  # fmt: skip
     columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
                "held τ [N m]")
