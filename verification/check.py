@@ -92,7 +92,8 @@ class Check:
     holds : one row -> True, False, or None if the row cannot decide; a pure function of the row, whose keys here lack
         the unit. Without it a row may have the key "holds"; without either, nothing is judged
     says : judged table -> the result in words with numbers. A topic may also return one or more Parts; a Part with an
-        empty verdict gets that of the table
+        empty verdict gets that of the table. By default the question with the number of rows that hold
+    spans : keys of the columns whose smallest and largest value the default sentence gives
     conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split the rows into parts,
         that count the cases of a row, that depend on measured times, and that are sentences (see `Column`)
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no fresh cases
@@ -110,6 +111,7 @@ class Check:
     row: Callable[[Study, Any], Row | Iterable[Row]]
     holds: Callable[[Row], bool | None] | None = None
     says: Callable[[Table], Said] | None = None
+    spans: Collection[str] = ()
     conditions: Collection[str] = ()
     parts: Collection[str] = ()
     counts: Collection[str] = ()
@@ -184,13 +186,21 @@ class Check:
         if self.says is None:
             if self.holds is None and not table.holds:
                 return ()
-            said: Said = f"{self.question} {sum(table.decided)} of {len(table.decided)} rows hold."
+            held = f"{sum(table.decided)} of {len(table.decided)} rows hold."
+            said: Said = f"{self.question} {held}{_spans(table, self.spans)}"
         else:
             said = self.says(table)
         if isinstance(said, str):
             said = Part(said, "", timed=any(column.timed for column in table.columns))
         given = (said,) if isinstance(said, Part) else tuple(said)
         return tuple(part if part.verdict else replace(part, verdict=self.rule(table.holds)) for part in given)
+
+
+def _spans(table: Table, keys: Iterable[str]) -> str:
+    """Return the smallest and largest value of each column in words."""
+    found = {key: [value for value in table[key] if value is not None] for key in keys}
+    return "".join(f" {key[:1].upper()}{key[1:]}: {min(values):.3g} to {max(values):.3g}."
+                   for key, values in found.items() if values)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ All engines are measured in the same way, from the positions and velocities of t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby, product
 from typing import Any
@@ -14,14 +14,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import IapbError, MissingDependencyError
-from reference.simulators import (
-    FIXED_SCENES,
-    SIMULATORS,
-    FixedScene,
-    Trajectory,
-    find_simulator,
-    fixed_scene,
-)
+from reference.simulators import FIXED_SCENES, SIMULATORS, FixedScene, Trajectory, find_simulator, fixed_scene
 from reference.simulators.trajectory import deepest_overlap
 from verification.check import Check, Study, Topic
 from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, attempt, check_depth
@@ -37,56 +30,38 @@ OUR_OWN = ("iapb", "rigid")  # simulators of this project: their exceptions are 
 # that a user would not notice, and far above rounding.
 CLOSE = 1e-2
 STAYS = 1e-3  # [m] a hundredth of the bodies' size
-NEVER_RISES = 1e-6  # relative rise of energy: above the rounding of 60 000 steps
+_ERRORS = ("energy", "momentum", "velocity")
+MEASURES = ("energy error", "largest rise of energy", "momentum error", "velocity error", "overlap / size",
+            "drift [m]", "creep [m]")  # of a motion, see `measured`
 MET, MISSED, FAILED, MISSING = "met", "missed", "failed", "not installed"
 
 
 @dataclass(frozen=True)
 class EngineRecord:
-    """Results of one engine on one scene. A number is None if it does not apply or if there is no trajectory.
+    """Results of one engine on one scene.
 
     engine, title, version : name of the adapter, name of the engine, and its version ("" if it is not installed)
-    scene : name of the scene; rests : whether all bodies must stay at rest in this scene
-    choice : "own" or "matched"; settings : step and options in words; note : features that the engine lacks
-    step, duration : time step, simulated time [s]
-    energy_error : (kinetic energy at the end − true) / kinetic energy at the start; impact scenes
-    energy_gain : largest rise of kinetic plus potential energy above its start value, divided by the kinetic energy at
-    the start; in resting scenes divided by the work of gravity along the scene's length
-    momentum_error : |momentum at the end − true| / sum of m |v| at the start; impact scenes
-    velocity_error : largest error of a body's final velocity / largest speed at the start; impact scenes
-    penetration : deepest overlap [m], by our measure; most_contacts : largest number of contacts, as the engine counts
-    drift : largest distance of a body from its start [m]; creep : drift in the second half; resting scenes
-    failure : reason why there are no numbers; missing : how to install the engine
+    scene : name of the scene; choice : "own" or "matched"; settings : step and options in words; duration : simulated
+    time [s]; note : features that the engine lacks
+    measures : see `measured`; failure : reason why there are none; missing : how to install the engine
     """
 
     engine: str
     title: str
     version: str
     scene: str
-    rests: bool
     choice: str
     settings: str = ""
     note: str = ""
-    step: float | None = None
     duration: float = 0.0
-    energy_error: float | None = None
-    energy_gain: float | None = None
-    momentum_error: float | None = None
-    velocity_error: float | None = None
-    penetration: float | None = None
-    most_contacts: int | None = None
-    drift: float | None = None
-    creep: float | None = None
+    measures: Row = field(default_factory=dict)
     failure: str = ""
     missing: str = ""
 
 
 def compare_engines(
-    engines: Sequence[str] | None = None,
-    scenes: Sequence[str] | None = None,
-    depth: str = "full",
-    progress: Callable[[int, int], None] | None = None,
-    failures: list[Failure] | None = None,
+    engines: Sequence[str] | None = None, scenes: Sequence[str] | None = None, depth: str = "full",
+    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> list[EngineRecord]:
     """Run every engine on every scene at both choices of settings.
 
@@ -109,7 +84,7 @@ def compare_engines(
 
 def _both(name: str, scene_name: str, depth: str) -> list[EngineRecord]:
     simulator, scene = find_simulator(name), fixed_scene(scene_name)
-    blank = EngineRecord(name, simulator.title, "", scene_name, scene.rests, OWN)
+    blank = EngineRecord(name, simulator.title, "", scene_name, OWN)
     try:
         blank = replace(blank, version=simulator.version())
     except MissingDependencyError as error:
@@ -119,97 +94,79 @@ def _both(name: str, scene_name: str, depth: str) -> list[EngineRecord]:
         duration = min(duration, QUICK_STACK if len(scene.bodies) > 1 else QUICK_REST)
     own, matched = simulator.settings(scene), simulator.settings(scene, MATCHED_STEP)
     records: list[EngineRecord] = []
-    for choice, settings in ((OWN, own), (MATCHED, matched)):
+    for choice, settings in zip(SETTINGS, (own, matched), strict=True):
         if records and settings == own:
             records.append(replace(records[0], choice=choice))
             continue
+        found, failure = dict[str, Any](), ""
         try:
-            found = measured(scene, simulator.run(scene, settings, settings.step, duration))
+            motion = simulator.run(scene, settings, settings.step, duration)
+            if motion.finite:
+                found = measured(scene, motion)
+            else:
+                first = int(np.argmin(np.isfinite(motion.velocity).all(axis=(1, 2))))
+                failure = f"not a number from {motion.time[first]:.4g} s on"
         except Exception as error:  # engines raise exceptions of any type; those of our own count as failed cases
             if name in OUR_OWN:
                 raise
             kind = "" if isinstance(error, IapbError) else f"{type(error).__name__}: "
-            found = {"failure": (kind + " ".join(str(error).split()))[:160]}
-        records.append(replace(blank, choice=choice, settings=str(settings), note=settings.note, step=settings.step,
-                               duration=duration, **found))
+            failure = (kind + " ".join(str(error).split()))[:160]
+        records.append(replace(blank, choice=choice, settings=str(settings), note=settings.note, duration=duration,
+                               measures=found, failure=failure))
     return records
 
 
 def measured(scene: FixedScene, motion: Trajectory) -> dict[str, Any]:
-    """Return the measures of an `EngineRecord`; if a number is not finite, return only a failure."""
-    if not motion.finite:
-        first = int(np.argmin(np.isfinite(motion.velocity).all(axis=(1, 2))))
-        return {"failure": f"not a number from {motion.time[first]:.4g} s on"}
-    kinetic, masses, most = motion.kinetic_energy(scene), scene.masses, int(motion.contacts.max())
+    """Return the measures of a motion; those that do not apply to the scene are None.
+
+    energy error : (kinetic energy at the end − true) / kinetic energy at the start; impact scenes
+    largest rise of energy : of kinetic plus potential energy above its start value, relative to the kinetic energy at
+        the start, or in resting scenes to the work of gravity along the scene's length
+    momentum error : |momentum at the end − true| / sum of m |v| at the start; impact scenes
+    velocity error : largest error of a body's final velocity / largest speed at the start; impact scenes
+    overlap / size : deepest overlap / the scene's length
+    drift : largest distance of a body from its start; creep : drift in the second half; resting scenes
+    """
+    kinetic, masses = motion.kinetic_energy(scene), scene.masses
     energy = kinetic + motion.potential_energy(scene)
     scale = float(masses.sum() * np.linalg.norm(scene.gravity) * scene.length) if scene.rests else kinetic[0]
-    common = {"penetration": max(0.0, deepest_overlap(scene, motion)), "most_contacts": most if most >= 0 else None,
-              "energy_gain": float((energy.max() - energy[0]) / scale)}
+    found: dict[str, Any] = dict.fromkeys(MEASURES) | {
+        "largest rise of energy": float((energy.max() - energy[0]) / scale),
+        "overlap / size": max(0.0, deepest_overlap(scene, motion)) / scene.length}
     if scene.rests:
         places, half = motion.position, motion.position[len(motion.position) // 2]
-        return common | {"drift": float(np.linalg.norm(places - places[0], axis=-1).max()),
-                         "creep": float(np.linalg.norm(places[-1] - half, axis=-1).max())}
+        return found | {"drift [m]": float(np.linalg.norm(places - places[0], axis=-1).max()),
+                        "creep [m]": float(np.linalg.norm(places[-1] - half, axis=-1).max())}
     truth = np.array(scene.final_velocities)
     true_energy = 0.5 * float(masses @ (truth**2).sum(axis=1))
     speeds, off = np.linalg.norm(motion.velocity[0], axis=1), motion.velocity[-1] - truth
-    return common | {
-        "energy_error": float((kinetic[-1] - true_energy) / kinetic[0]),
-        "momentum_error": float(np.linalg.norm(masses @ off) / (masses @ speeds)),
-        "velocity_error": float(np.linalg.norm(off, axis=1).max() / scene.fastest),
-    }
+    return found | {"energy error": float((kinetic[-1] - true_energy) / kinetic[0]),
+                    "momentum error": float(np.linalg.norm(masses @ off) / (masses @ speeds)),
+                    "velocity error": float(np.linalg.norm(off, axis=1).max() / scene.fastest)}
 
 
 def verdict(record: EngineRecord) -> str:
     """Return one of MET, MISSED, FAILED and MISSING."""
-    if record.missing:
-        return MISSING
-    if record.failure:
-        return FAILED
-    if record.rests:
-        return MET if (record.drift or 0.0) <= STAYS else MISSED
-    errors = (record.energy_error, record.momentum_error, record.velocity_error)
-    return MET if all(abs(error or 0.0) <= CLOSE for error in errors) else MISSED
-
-
-# The topic of the report: a record is a row.
+    if record.missing or record.failure:
+        return MISSING if record.missing else FAILED
+    if (drift := record.measures["drift [m]"]) is not None:
+        return MET if drift <= STAYS else MISSED
+    return MET if all(abs(record.measures[f"{name} error"]) <= CLOSE for name in _ERRORS) else MISSED
 
 
 def row_of(record: EngineRecord) -> Row:
     """Return the row of a record."""
-    depth = None if record.penetration is None else record.penetration / fixed_scene(record.scene).length
-    return {
-        "engine": record.title, "version": record.version, "scene": record.scene.replace("_", " "),
-        "settings": record.choice, "law": verdict(record), "energy error": record.energy_error,
-        "largest rise of energy": record.energy_gain, "momentum error": record.momentum_error,
-        "velocity error": record.velocity_error,
-        "overlap / size": depth, "drift [m]": record.drift, "creep [m]": record.creep,
-        "simulated [s]": record.duration or None, "failure": record.failure,
-    }  # fmt: skip
+    return {"engine": record.title, "version": record.version, "scene": record.scene.replace("_", " "),
+            "settings": record.choice, "law": verdict(record), **dict.fromkeys(MEASURES), **record.measures,
+            "simulated [s]": record.duration or None, "failure": record.failure}  # fmt: skip
 
 
-def sentence(records: Sequence[EngineRecord]) -> str:
-    """Return the results of one engine at one choice of settings in one sentence."""
-    if records[0].missing:
-        return f"{records[0].title} is not installed here: {records[0].missing}"
-    return _sentence(ERRORS.table_of(map(row_of, records)).records())
-
-
-def _sentence(rows: Sequence[Row]) -> str:
-    """The results of one engine at one choice of settings, from its rows."""
-    met, first = _met(rows), rows[0]
+def sentence(rows: Sequence[Row]) -> str:
+    """Return the results of one engine at one choice of settings in one sentence, from its rows."""
+    first, missed = rows[0], ", ".join(f"{row['scene']} ({_worst(row)})" for row in rows if row["law"] != MET)
     at = "with its own settings" if first["settings"] == OWN else f"with a step of {1e3 * MATCHED_STEP:g} ms"
-    parts = [f"{first['engine']} {first['version']}, {at}, gives the known outcome in {met} of {len(rows)} scenes"]
-    if met < len(rows):
-        missed = (f"{row['scene']} ({_worst(row)})" for row in rows if row["law"] != MET)
-        parts.append("it misses it in " + ", ".join(missed))
-    gains = [row for row in rows if (row["largest rise of energy"] or 0.0) > NEVER_RISES]
-    if gains:
-        most = max(gains, key=lambda row: row["largest rise of energy"])
-        parts.append(f"energy rises in {len(gains)} scene{'s' * (len(gains) > 1)}, with a relative rise of at most "
-                     f"{most['largest rise of energy']:.2g} ({most['scene']})")
-    else:
-        parts.append("energy rises in no scene")
-    return "; ".join(parts) + "."
+    return (f"{first['engine']} {first['version']}, {at}, gives the known outcome in {_met(rows)} of {len(rows)} "
+            f"scenes{missed and f'; it misses it in {missed}'}.")  # fmt: skip
 
 
 def _worst(row: Row) -> str:
@@ -218,8 +175,8 @@ def _worst(row: Row) -> str:
         return "failed: " + row["failure"].rstrip(".")
     if row["drift"] is not None:
         return f"moves by {row['drift']:.3g} m"
-    name = max(("energy", "momentum", "velocity"), key=lambda name: abs(row[f"{name} error"] or 0.0))
-    return f"{name} off by {abs(row[f'{name} error'] or 0.0):.2g}"
+    size, name = max(((abs(row[f"{name} error"]), name) for name in _ERRORS), key=lambda one: one[0])
+    return f"{name} off by {size:.2g}"
 
 
 def _rows(study: Study, case: tuple[str, str]) -> Iterator[Row]:
@@ -244,7 +201,7 @@ def _says(table: Table) -> Iterator[Part]:
     for engine, choice in dict.fromkeys((row["engine"], row["settings"]) for row in present):
         group = [row for row in present if (row["engine"], row["settings"]) == (engine, choice)]
         missed = _misses(group)
-        yield Part(_sentence(group), MIXED if missed else REPRODUCED, miss=missed if _is_ours(group[0]) else "")
+        yield Part(sentence(group), MIXED if missed else REPRODUCED, miss=missed if _is_ours(group[0]) else "")
     absent = sorted(set(table.where(law=MISSING).column("engine")))
     if absent:
         yield Part(f"Not installed, hence not compared: {', '.join(absent)}.", NOT_TESTABLE, optional=True)

@@ -12,11 +12,10 @@ from dataclasses import replace
 from reference.worlds import run_world
 from verification.check import Check, Topic
 from verification.claims.speed import C19, C22
-from verification.clock import target
 from verification.cost.growth import FITTED, SCALING, TITLES, most_contacts, printed_over_factored
 from verification.cost.impacts import BUDGET_ROWS, ORDER_BIAS
 from verification.cost.robots import ROBOTS
-from verification.cost.solvers import IMPACT_TIMES, solvers_say
+from verification.cost.solvers import IMPACT_TIMES, faster, solvers_say
 from verification.cost.steps import BODIES, PROFILE, RACES, START
 from verification.cost.trajectories import MOTIONS, WORTH
 from verification.finding import NOT_COMPUTED, REPRODUCED, Finding, Part
@@ -32,14 +31,10 @@ def _rates(trials: Table) -> Iterator[Row]:
 
 def _kernels_say(table: Table) -> Part:
     """Say where Lemke's method is faster than IAPB by the times of claim C22, which the figure of them shows."""
-    slower, count = table.that(False), len(table.decided)
-    sizes = {name: slower.where(problem=name).column("contacts") for name in dict.fromkeys(slower.column("problem"))}
+    slower = table.that(False)
+    sizes = {name: slower.where(problem=name)["contacts"] for name in dict.fromkeys(slower["problem"])}
     where = " and ".join(f"with {min(found)} to {max(found)} {name}" for name, found in sizes.items())
-    return target(
-        f"One impact, from M, J and v to v⁺ at the same accuracy, compiled on both sides (claim C22): IAPB is faster "
-        f"than Lemke's method in {count - len(slower.rows)} of the {count} impacts whose times differ clearly "
-        f"({len(table.rows) - count} do not){f'; slower {where}' if where else ''}.", not slower.rows,
-        f"compiled, IAPB is slower than Lemke's method in {len(slower.rows)} of {count} impacts")  # fmt: skip
+    return faster("compiled", "Lemke's method", "impacts", table.holds, where)
 
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:

@@ -17,18 +17,16 @@ from reports.counterexamples import ENGINE, CampaignRequest, recheck_command
 from reports.counterexamples import recheck as judge_again
 from reports.show import Answer, Json, stage_progress
 from verification import check_passivity
-from verification.engines import SETTINGS, compare_engines, sentence, verdict
+from verification.engines import ERRORS, MEASURES, SETTINGS, compare_engines, row_of, sentence, verdict
 from verification.laws import CONTRACTS
 from verification.laws.bounds import LawCount
 from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
-from verification.table import Table, titled
+from verification.table import Table, table_from
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M) in tests of the engine, of any other resolver
 LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json
 _SHOWN = 20  # counterexamples listed; all are in their folder
-_ENGINE_NUMBERS = {"energy": "energy_error", "rise": "energy_gain", "momentum": "momentum_error",
-                   "velocity": "velocity_error", "depth [m]": "penetration", "drift [m]": "drift"}  # fmt: skip
 
 
 def verify(
@@ -150,13 +148,14 @@ def _simulators(simulators: Sequence[str], scenes: Sequence[str]) -> Answer:
     for name in names:
         for choice in SETTINGS:
             of_engine = [record for record in records if record.engine == name and record.choice == choice]
-            lines.append(sentence(of_engine))
             if of_engine[0].missing:
+                lines.append(f"{of_engine[0].title} is not installed here: {of_engine[0].missing}")
                 break
+            lines.append(sentence(ERRORS.table_of(map(row_of, of_engine)).records()))
     if present:
-        rows = [(one.engine, one.scene, one.choice, verdict(one),
-                 *(getattr(one, name) for name in _ENGINE_NUMBERS.values())) for one in present]  # fmt: skip
-        lines += ["", titled(("engine", "scene", "settings", "law", *_ENGINE_NUMBERS), rows, digits=2)]
+        rows = [{"engine": one.engine, "scene": one.scene, "settings": one.choice, "law": verdict(one),
+                 **dict.fromkeys(MEASURES), **one.measures} for one in present]  # fmt: skip
+        lines += ["", table_from(rows, 2)]
         lines += [f"{one.engine}, {one.scene}: {one.failure}" for one in present if one.failure]
         uses: dict[str, list[str]] = {}
         for one in present:

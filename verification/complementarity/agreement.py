@@ -184,10 +184,10 @@ def _map_says(table: Table) -> list[Part]:
     whole = ", ".join(sorted(name for name, found in families.items() if _agreement(found) == 1.0))
     parts = [Part(
         "With equal e the two laws agree if and only if some p >= 0 gives IAPB's velocity; "
-        f"{sum(row['contradictions'] for row in rows)} of {sum(row['cases'] for row in rows)} impacts contradict this. "
+        f"{sum(table['contradictions'])} of {sum(table['cases'])} impacts contradict this. "
         "Where they differ, the distance is that of IAPB's impulse from the cone of pushing impulses, and IAPB loses ½ "
-        f"(1−e)/(1+e) · distance² more (to {max(row['defect'] for row in rows):.0e}), at most "
-        f"{max(row['largest extra loss of KE⁻'] for row in rows):.0%} of KE⁻. They agree in all impacts of: {whole}.",
+        f"(1−e)/(1+e) · distance² more (to {max(table['defect']):.0e}), at most "
+        f"{max(table['largest extra loss of KE⁻']):.0%} of KE⁻. They agree in all impacts of: {whole}.",
         "", "statements")]  # fmt: skip
     if scenes:
         apart = sorted({row["impacts"].removeprefix("scene ") for row in scenes if row["share that agrees"] < 1.0})

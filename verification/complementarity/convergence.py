@@ -23,7 +23,7 @@ from reference.time_stepping import RigidConstraints
 from reference.worlds import find_world
 from verification.check import Check
 from verification.finding import verdict_of_trials
-from verification.table import HOLDS, Table
+from verification.table import HOLDS
 
 TRUTH_SCENES = {path.stem: path for path in sorted((Path(__file__).parent / "scenes").glob("*.yaml"))}
 COARSE, FINE = (470.0, 500.0, 530.0), (1880.0, 2000.0, 2120.0)  # rates [Hz]; a factor of four between the levels
@@ -137,24 +137,12 @@ QUICK = ("two_discs", "bernoulli_balls", "two_link_arm_a", "peg_corner", "peg_ho
          "ball_dropped_in_space")  # the scenes of the quick depth
 
 
-def _says(table: Table) -> str:
-    scenes = dict.fromkeys(table.column("scene"))
-    apart = [row["scene"] for row in table.that(False).records()]
-    orders = [order for name in ("positions", "velocities") for order in table.column(f"order, {name}")
-              if order is not None]  # fmt: skip
-    more = f" ({len(CASES) - len(scenes)} more with --full)" if len(scenes) < len(CASES) else ""
-    return (
-        f"The ideal world converges to the event-driven solution at first order "
-        f"{'not on ' + ', '.join(apart) if apart else 'on all'} of {len(scenes)} scenes{more}: measured orders "
-        f"{min(orders):.2f} to {max(orders):.2f}, median {np.median(orders):.2f} (positions in the sup norm, "
-        f"velocities in L¹). No event-driven solution exists for {', '.join(WITHOUT_TRUTH)}."
-    )
-
-
 CONVERGENCE = Check(
     key="convergence", question="The ideal world converges to the event-driven solution at first order.",
     cases=lambda study: [case for case in CASES if study.depth == "full" or case.scene in QUICK],
-    row=lambda study, case: converge(case), says=_says, rule=verdict_of_trials, digits=3,
+    row=lambda study, case: converge(case), spans=("order, positions", "order, velocities"), rule=verdict_of_trials,
+    digits=3,
     note="Each row shows the largest error of three steps near the one given; positions in the sup norm [m, rad], "
-    "velocities in L¹ over time [m, rad]. A dash: the error is rounding alone.",
+    "velocities in L¹ over time [m, rad]. A dash: the error is rounding alone. No event-driven solution exists for "
+    f"{', '.join(WITHOUT_TRUTH)}.",
 )  # fmt: skip

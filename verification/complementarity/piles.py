@@ -10,7 +10,7 @@ whether the laws agree does not depend on e (statement 2).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -92,21 +92,12 @@ def group_rows(study: Study, group: tuple[str, list[ImpactCase]]) -> Iterator[Ro
     """Yield a row for the approaching and one for the touching contacts of a group of piles."""
     for rows in ("approaching", "touching"):
         found = [compare_pile(case, rows) for case in group[1]]
-        value = {name: [one[name] for one in found] for name in found[0]}
-        yield {
-            "pile": group[0], "rows": rows, "piles": len(found),
-            **{name: float(np.mean(value[name])) for name in ("contacts", "redundant", "share that agrees")},
-            "most contacts that agree": max((one["contacts"] for one in found if one["share that agrees"]), default=0),
-            **{name: float(np.mean(value[name])) for name in ("share of impulses that pull", "negative share of p")},
-            "median distance from the LCP": float(np.median(value["distance"])),
-            "pushing from the LCP": max(value["pushing from the LCP"]),
-            **{name: 1e6 * float(np.median(value[name])) for name in TIMES},
-            "contradicted by least squares": sum(value["contradicted"]), "largest change of KE": max(value["gain"]),
-        }  # fmt: skip
+        yield {"pile": group[0], "rows": rows, "piles": len(found),
+               **{name: summed([one[name] for one in found]) for name, summed in SUMMED_UP.items()}}  # fmt: skip
 
 
-def compare_pile(case: ImpactCase, rows: str = "approaching") -> dict[str, Any]:
-    """Resolve one pile by (21) and by impulses that only push; times in seconds.
+def compare_pile(case: ImpactCase, rows: str = "approaching") -> Row:
+    """Resolve one pile by (21) and by impulses that only push, and return its entry in each column of SUMMED_UP.
 
     It agrees if some p >= 0 gives the velocity of (21). Non-negative least squares contradicts this, where it is asked.
     """
@@ -117,25 +108,34 @@ def compare_pile(case: ImpactCase, rows: str = "approaching") -> dict[str, Any]:
     law, p = newton_lcp(ImpactProblem.from_impact(mass, given, v, 0.0)).velocity, equal.impulses
     distance = case.distance(equal.velocity, push.velocity)
     agrees, asked = distance <= PUSHED, len(given) <= 4 * ASKED and len(v) <= 3 * ASKED
-    return {
-        "contacts": len(given), "redundant": len(given) - equal.rank, "share that agrees": agrees,
-        "distance": distance, "share of impulses that pull":
-        float(np.mean(p < -PULLS * np.abs(p).max(initial=0.0))) if len(p) else 0.0,
-        "negative share of p": float(-p[p < 0.0].sum() / (np.abs(p).sum() or 1.0)),
-        "pushing from the LCP": case.distance(push.velocity, law), "gain": push.energy_change / (0.5 * case.speed**2),
-        "contradicted": asked and nonnegative_impulse(given, equal.generalized_impulse, mass).exists != agrees,
-        **dict(zip(TIMES, (equality, pushing), strict=True)),
-    }  # fmt: skip
+    pulls = float(np.mean(p < -PULLS * np.abs(p).max(initial=0.0))) if len(p) else 0.0
+    contradicted = asked and nonnegative_impulse(given, equal.generalized_impulse, mass).exists != agrees
+    values = (len(given), len(given) - equal.rank, agrees, len(given) * agrees, pulls,
+              float(-p[p < 0.0].sum() / (np.abs(p).sum() or 1.0)), distance, case.distance(push.velocity, law),
+              1e6 * equality, 1e6 * pushing, contradicted, push.energy_change / (0.5 * case.speed**2))  # fmt: skip
+    return dict(zip(SUMMED_UP, values, strict=True))
+
+
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values))
+
+
+def _median(values: list[float]) -> float:
+    return float(np.median(values))
 
 
 TIMES = ("time of (21) [µs]", "time of pushing [µs]")
+SUMMED_UP: dict[str, Callable[[list[Any]], Any]] = {  # column -> its value for a group of piles
+    "contacts": _mean, "redundant": _mean, "share that agrees": _mean, "most contacts that agree": max,
+    "share of impulses that pull": _mean, "negative share of p": _mean, "median distance from the LCP": _median,
+    "pushing from the LCP": max, **dict.fromkeys(TIMES, _median), "contradicted by least squares": sum,
+    "largest change of KE": max,
+}  # fmt: skip
 
 
 def _says(table: Table) -> Part:
-    rows = table.records()
-    piles = sum(row["piles"] for row in rows)
+    rows, piles, limit = table.records(), sum(table["piles"]), max(table["most contacts that agree"])
     agree = sum(row["piles"] * row["share that agrees"] for row in rows)
-    limit = max(row["most contacts that agree"] for row in rows)
     beyond = [row for row in rows if row["contacts"] > limit] or rows
     pulling = 100.0 * float(np.average([row["share of impulses that pull"] for row in beyond],
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
@@ -144,9 +144,9 @@ def _says(table: Table) -> Part:
         f"{agree:.0f} of {piles} impacts, and in none with more than {limit} contacts. Do not use (19) where more than "
         f"{limit} contacts collide at once: there {pulling:.0f} % of the impulses pull. With impulses that only push "
         "(method \"poisson\", world IAPB-push) the velocity equals the LCP's to "
-        f"{max(row['pushing from the LCP'] for row in rows):.0e}, and the energy changes by at most "
-        f"{max(row['largest change of KE'] for row in rows):.0e} KE⁻. Non-negative least squares contradicts this in "
-        f"{sum(row['contradicted by least squares'] for row in rows)} impacts.",
+        f"{max(table['pushing from the LCP']):.0e}, and the energy changes by at most "
+        f"{max(table['largest change of KE']):.0e} KE⁻. Non-negative least squares contradicts this in "
+        f"{sum(table['contradicted by least squares'])} impacts.",
         verdict_of_share(agree / piles), "piles",
         miss=f"beyond {limit} contacts at once {pulling:.0f} % of IAPB's impulses pull")  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 
@@ -36,16 +36,12 @@ def scaling(study: Study, sizes: Sequence[tuple[int, int]]) -> list[Row]:
               if method == FACTORED or c <= PRINTED_UP_TO]  # fmt: skip
     name = "{0[0]}, d = {0[1]}, c = {0[2]}".format
     with one_thread():
-        made = {size: attempt(name(size), partial(size_sampler, *size), study.failures) for size in wanted}
+        made = {size: attempt(name(size), lambda size=size: sampler(_call(*size)), study.failures)  # type: ignore[misc]
+                for size in wanted}
         times = take_turns({size: call for size, call in made.items() if call is not None},
                            15 if study.depth == "full" else 7, failures=study.failures, name=name)  # fmt: skip
     return [{"method": method, "coordinates": d, "contacts": c, **time_cells(taken)}
             for (method, d, c), taken in times.items()]  # fmt: skip
-
-
-def size_sampler(method: str, d: int, c: int) -> Callable[[], float]:
-    """Return the contestant of one size."""
-    return sampler(_call(method, d, c))
 
 
 def _call(method: str, d: int, c: int) -> Call:

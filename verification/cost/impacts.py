@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
+from itertools import product
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -303,24 +304,21 @@ CHOSEN = ("contacts", "coordinates", "budget [µs]", "method", "work", "time [µ
 
 def choices(measured: Table) -> Table:
     """Return the result of `choose` for every measured size and every budget."""
-    return table_from(
-        [_chosen(measured, budget, *size) for size in dict.fromkeys(measured.select(("contacts", "coordinates")).rows)
-         for budget in BUDGETS], digits=2, timed=CHOSEN[3:], note=(
-            f"Compiled methods; the last column is for calls from Python. None: nothing solves half of the nine "
-            f"impacts to {SOLVED:g} in time; then the nearest method, and its largest error."))  # fmt: skip
-
-
-def _chosen(measured: Table, budget: float, contacts: int, coordinates: int) -> Row:
-    best, python = (choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON))
-    row = dict.fromkeys(CHOSEN) | {
-        "contacts": contacts, "coordinates": coordinates, "budget [µs]": 1e6 * budget, "method": "none",
-        "from Python": f"{python.method}, {short_time(python.time)}" if python and python.enough else "none"}
-    if best and best.enough:
-        row |= {"method": best.method, "work": best.work, "time [µs]": 1e6 * best.time, "error": best.error,
-                "largest error": best.largest, "share solved [%]": 100.0 * best.solved}  # fmt: skip
-    elif best:
-        row["nearest"] = f"{best.method}, {best.work}: {best.largest:.1g}"
-    return row
+    rows = []
+    for size, budget in product(dict.fromkeys(measured.select(("contacts", "coordinates")).rows), BUDGETS):
+        best, python = (choose(measured, budget, *size, called) for called in (COMPILED, PYTHON))
+        row = dict.fromkeys(CHOSEN) | {
+            "contacts": size[0], "coordinates": size[1], "budget [µs]": 1e6 * budget, "method": "none",
+            "from Python": f"{python.method}, {short_time(python.time)}" if python and python.enough else "none"}
+        if best and best.enough:
+            row |= {"method": best.method, "work": best.work, "time [µs]": 1e6 * best.time, "error": best.error,
+                    "largest error": best.largest, "share solved [%]": 100.0 * best.solved}  # fmt: skip
+        elif best:
+            row["nearest"] = f"{best.method}, {best.work}: {best.largest:.1g}"
+        rows.append(row)
+    return table_from(rows, digits=2, timed=CHOSEN[3:], note=(
+        f"Compiled methods; the last column is for calls from Python. None: nothing solves half of the nine impacts to "
+        f"{SOLVED:g} in time; then the nearest method, and its largest error."))  # fmt: skip
 
 
 def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:

@@ -24,7 +24,7 @@ STATES = 200  # random states, one call each, in one round
 ROUNDS = {"quick": 25, "full": 200}
 ONE, MANY = "one state per call", f"{STATES} states in one call"
 LIMITS = {ONE: 3.0, MANY: 1.0}  # target of the ratio
-OTHERS = robot_files()[0]
+OTHERS = robot_files()
 FILES = {path.stem: path for path in OTHERS or sorted((SHIPPED / "robots").glob("*.urdf"))}
 
 

@@ -7,7 +7,8 @@ step. Only methods that are called in the same way are compared.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,17 +46,16 @@ def time_impact(study: Study, size: Size) -> Iterator[Row]:
     case = FAMILIES[size.family](size.contacts, np.random.default_rng([SEED, size.contacts]))
     too_slow: dict[tuple[str, str], float] = study.once("too slow", dict)
     own = {KERNEL: calls.kernel_call, IAPB: calls.engine_call, PRINTED: calls.printed_call}
-    timed: dict[str, Call] = {name: make(case) for name, make in own.items()}
-    notes: dict[str, str] = {}
+    others = {LEMKE_KERNEL: calls.lemke_call, **{name: partial(calls.solver_call, name=name) for name in SOLVERS}}
+    timed, answers, notes = dict[str, Call](), dict[str, Any](), dict[str, str]()
     with one_thread():
-        answers = {name: call() for name, call in timed.items()}
-        for name in (LEMKE_KERNEL, *SOLVERS):
-            if (size.family, name) in too_slow:
+        for name, make in (own | others).items():
+            if name in others and (size.family, name) in too_slow:
                 notes[name] = f"left out: {too_slow[size.family, name]:.3g} s for fewer contacts"
                 continue
             try:
-                call = calls.lemke_call(case) if name == LEMKE_KERNEL else calls.solver_call(case, name)
-                answers[name] = call()
+                call = make(case)
+                answers[name], timed[name] = call(), call
             except MissingDependencyError as error:
                 notes[name] = f"missing: {error}"
             except Exception as error:
@@ -63,8 +63,6 @@ def time_impact(study: Study, size: Size) -> Iterator[Row]:
                     raise
                 study.failures.append(failure_of(f"{name} on a {size.family} of {size.contacts} contacts", error))
                 notes[name] = f"failed: {error}"
-            else:
-                timed[name] = call
         samples = take_turns({name: sampler(call) for name, call in timed.items()}, ROUNDS[study.depth], warm=False)
     limit = LONGEST[study.depth]
     too_slow.update({(size.family, name): one.median for name, one in samples.items() if one.median > limit})
@@ -96,19 +94,23 @@ def solvers_say(table: Table) -> Part:
     ours = {(row["impacts"], row["contacts"]): row for row in rows if row["solver"] == IAPB}
     pairs = [(row, costs_more(row, ours[row["impacts"], row["contacts"]])) for row in rows
              if row["solver"] not in (IAPB, KERNEL, PRINTED, LEMKE_KERNEL) and row["outcome"] == "solved"]  # fmt: skip
-    decided = [more for _, more in pairs if more is not None]
-    if not decided:
-        return Part("Times of complementarity solvers: none called from Python was timed that differs clearly from "
-                    "IAPB's.", NOT_COMPUTED, timed=True)  # fmt: skip
-    slower = decided.count(False)
     where = ", ".join(f"{row['solver']} on the {row['impacts']} at {row['contacts']} contacts"
                       for row, more in pairs if more is False)
+    return faster("from Python", "a solver", "pairs of solver and size", [more for _, more in pairs],
+                  where and f"than {where}")
+
+
+def faster(how: str, rival: str, what: str, outcomes: Sequence[bool | None], where: str) -> Part:
+    """Say in how many cases IAPB is faster than a rival, and where it is slower; None is a difference within noise."""
+    count, slower = sum(more is not None for more in outcomes), outcomes.count(False)
+    if not count:
+        return Part(f"Time of one impact {how}: nothing was timed that differs clearly from IAPB.", NOT_COMPUTED,
+                    timed=True)
     return target(
-        f"One impact, from M, J and v to v⁺ at the same accuracy, from Python on both sides: IAPB is faster in "
-        f"{len(decided) - slower} of the {len(decided)} pairs of solver and size whose times differ clearly "
-        f"({len(pairs) - len(decided)} do not){where and f'; slower than {where}'}.", not slower,
-        f"from Python, IAPB is slower than a solver in {slower} of {len(decided)} pairs of solver and size"
-    )  # fmt: skip
+        f"One impact, from M, J and v to v⁺ at the same accuracy, {how} on both sides: IAPB is faster than {rival} in "
+        f"{count - slower} of the {count} {what} whose times differ clearly ({len(outcomes) - count} do not)"
+        f"{where and f'; slower {where}'}.", not slower,
+        f"{how}, IAPB is slower than {rival} in {slower} of {count} {what}")  # fmt: skip
 
 
 MEASURED = ("median [µs]", "least [µs]", "largest [µs]")

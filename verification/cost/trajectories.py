@@ -245,16 +245,13 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
     front with an error of at most USEFUL. "Cut short" is the number of scenes in which the method might still reach
     the front with steps that would take too long.
     """
-    return WORTH.table_of(_worth_of(motions, methods))
-
-
-def _worth_of(motions: Table, methods: Sequence[str]) -> Iterator[Row]:
-    found = curves(motions, methods)
-    for method in dict.fromkeys(curve.method for curve in sorted(found, key=lambda curve: methods.index(curve.method))):
-        mine = [curve for curve in found if curve.method == method]
+    rows, by_method = list[Row](), dict[str, list[Curve]]()
+    for curve in sorted(curves(motions, methods), key=lambda curve: methods.index(curve.method)):
+        by_method.setdefault(curve.method, []).append(curve)
+    for method, mine in by_method.items():
         costs = [curve.cost for curve in mine if curve.cost is not None]
         front = [run["position"] for curve in mine for run in curve.front]
-        yield {
+        rows.append({
             "method": method, "called": "compiled" if method in INTEGRATORS else "from Python",
             "tenfold accuracy costs": float(np.median(costs)) if costs else None,
             "least cost": min(costs, default=None), "largest cost": max(costs, default=None),
@@ -264,7 +261,8 @@ def _worth_of(motions: Table, methods: Sequence[str]) -> Iterator[Row]:
             "most exact there": min(front, default=None), "least exact there": max(front, default=None),
             "energy made": max(run["energy made"] for curve in mine for run in curve.runs),
             "cut short [scenes]": sum(curve.cut_short for curve in mine),
-            "failed [runs]": sum(run["outcome"] != OK for run in motions.where(method=method).records())}
+            "failed [runs]": sum(run["outcome"] != OK for run in motions.where(method=method).records())})
+    return WORTH.table_of(rows)
 
 
 def on_front(row: Record, others: Sequence[Record]) -> bool:
@@ -458,7 +456,7 @@ MOTIONS = Check(
 )  # fmt: skip
 WORTH = Check(
     key="worth", question="Which method is worth its time?", row=lambda _, row: row, digits=2,
-    cases=lambda study: list(_worth_of(study.table(MOTIONS), WORLDS)), timed=(
+    cases=lambda study: worth(study.table(MOTIONS), WORLDS).by_title(), timed=(
         "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
     note="Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "

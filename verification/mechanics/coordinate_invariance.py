@@ -21,7 +21,7 @@ from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference import Floats
 from verification.check import Check, Study
-from verification.table import Row, Table
+from verification.table import Row
 
 EPSILON = float(np.finfo(np.float64).eps)
 AGREEMENT = 1e-10  # tolerance relative to the velocity in the kinetic metric, for moderate condition numbers:
@@ -172,23 +172,10 @@ def holds(row: Row) -> bool | None:
     return None if row["tolerance"] >= 1.0 else row["refused"] == 0 and row["error"] <= row["tolerance"]
 
 
-def invariance(table: Table) -> str:
-    """Return the error for moderate condition numbers, and for the other cases, in words."""
-    moderate = table.where(tolerance=AGREEMENT).column("error")
-    beyond = [row["error"] / row["bound"] for row, held in zip(table.records(), table.holds, strict=True)
-              if held is not None and row["tolerance"] != AGREEMENT]  # fmt: skip
-    return (
-        f"C06: the same impact, solved in two sets of coordinates, agrees to {max(moderate):.1e} in {len(moderate)} "
-        f"cases of moderate condition number (tolerance {AGREEMENT:g}). In {len(beyond)} worse conditioned cases, up "
-        f"to the singular pose, the error is at most {max(beyond):.1e} of the rounding bound C ε κ/σ_min. In "
-        f"{table.holds.count(None)} cases this bound exceeds 1, so they cannot be judged.")  # fmt: skip
-
-
 COORDINATES = Check(
     key="coordinate invariance", question="An impact has one outcome, whatever the coordinates it is solved in.",
-    cases=_cases, row=_row, holds=holds, says=invariance, parts=("coordinates",),
-    note="An impact has one outcome, whatever the coordinates it is solved in. Tolerance: "
-         f"{AGREEMENT:g} of the velocity in the kinetic metric where κ(M) and κ(∂f/∂r)² are at most {MODERATE:g} and "
-         f"rows are redundant exactly or separated (σ_min ≥ {SEPARATED:g}); elsewhere {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² "
-         "/ σ_min, which says nothing once it exceeds 1.",
+    cases=_cases, row=_row, holds=holds, parts=("coordinates",), spans=("error",),
+    note=f"C06. Tolerance: {AGREEMENT:g} of the velocity in the kinetic metric where κ(M) and κ(∂f/∂r)² are at most "
+         f"{MODERATE:g} and rows are redundant exactly or separated (σ_min ≥ {SEPARATED:g}); elsewhere "
+         f"{CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min, which says nothing once it exceeds 1.",
 )  # fmt: skip

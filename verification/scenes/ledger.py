@@ -85,21 +85,17 @@ def _thickness(shape: Mapping[str, Any]) -> float:
 def _of_contacts(table: Table) -> Iterator[Part]:
     """Yield the parts on penetration, on energy in impacts, and on how the runs end."""
     rows = table.records()
-    touching = [row for row in rows if row["most contacts in one step"]]
-    ratio, scene = max((row["most penetration"] / row["thinnest moving shape"], row["scene"]) for row in touching)
-    median, deepest = float(np.median([row["most penetration"] for row in touching])), _most(rows, "most penetration")
-    passes = "" if ratio >= DEEP else " Nothing passes through anything."
+    ratio, scene = max((row["most penetration"] / row["thinnest moving shape"], row["scene"]) for row in rows
+                       if row["most contacts in one step"])
+    deepest, most = _most(rows, "most penetration"), _most(rows, "most rows in one impact")
     yield Part(
-        f"Bodies overlap by at most {deepest['most penetration']:.2f} mm ({deepest['scene']}); the median of the "
-        f"{len(touching)} scenes with contacts is {median:.2f} mm. Relative to the thinnest moving shape of the scene, "
-        f"the deepest overlap is {ratio:.0%} ({scene}).{passes}", REPRODUCED if ratio < DEEP else MIXED)
-    gained, most = max(table.column(_ADDED)), _most(rows, "most rows in one impact")
-    rounding = gained <= ROUNDING
+        f"Bodies overlap by at most {deepest['most penetration']:.2f} mm ({deepest['scene']}), and by at most "
+        f"{ratio:.0%} of the thinnest moving shape of the scene ({scene}).", REPRODUCED if ratio < DEEP else MIXED)
+    gained = max(table.column(_ADDED))
     yield Part(
         f"In {sum(table.column('impacts'))} impacts of the scenes as their files are, with up to "
         f"{most['most rows in one impact']} rows at once ({most['scene']}), the largest energy gain, summed in "
-        f"doubles, is {gained:.0e} of the energy exchanged" + (", the rounding of that sum." if rounding else "."),
-        REPRODUCED if rounding else REFUTED)
+        f"doubles, is {gained:.0e} of the energy exchanged.", REPRODUCED if gained <= ROUNDING else REFUTED)
     complete = sum(not row["how it ends"].startswith(STOPPED) for row in rows)
     yield Part(f"{complete} of {len(rows)} runs complete.", REPRODUCED if complete == len(rows) else REFUTED)
 
@@ -120,14 +116,13 @@ def _of_books(table: Table) -> Part:
     rows = table.records()
     made = sorted((row for row in rows if row[GAIN_SHARE] * row["energy exchanged"] > 100 * rounding_of(row)),
                   key=lambda row: float(row[GAIN_SHARE]), reverse=True)
-    if not made:
-        return Part("In no scene does the stored energy ever exceed the energy at the start plus the work done on it.",
-                    REPRODUCED)
-    words = ", ".join(f"{row['scene']} {row[GAIN_SHARE]:.1f} %" for row in made)
+    words = "".join(f", {row['scene']} {row[GAIN_SHARE]:.1f} %" for row in made)
     return Part(
         f"In {len(rows) - len(made)} of {len(rows)} scenes the stored energy never exceeds the energy at the start "
-        f"plus the work done on the scene. In the others it does at some instant, by these shares of the energy "
-        f"exchanged: {words}. Time stepping creates this energy, not the impacts.", MIXED)
+        "plus the work done on the scene"
+        + (f". In the others time stepping, not the impacts, creates energy at some instant, by these shares of the "
+           f"energy exchanged: {words[2:]}" if made else "") + ".",
+        MIXED if made else REPRODUCED)
 
 
 def _of_residuals(table: Table) -> Iterator[Part]:
@@ -144,16 +139,13 @@ def _of_residuals(table: Table) -> Iterator[Part]:
         f"{max(row['order declared'] for row in tried)}."
         + (f" Below the declared order: {below}." if short else ""), MIXED if short else REPRODUCED)
     wide = sorted((row for row in rows if row[OPEN] > WORTH_NAMING), key=lambda row: float(row[OPEN]), reverse=True)
-    if not wide:
-        yield Part(f"No residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged at the scene's own time step.",
-                   REPRODUCED)
-        return
-    said = ", ".join(f"{row['scene']} {row[OPEN]:.1f} %" for row in wide)
+    said = "".join(f", {row['scene']} {row[OPEN]:.1f} %" for row in wide)
     yield Part(
         f"At the scene's own time step the residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged in "
-        f"{len(wide)} of {len(rows)} scenes (absolute values of motion, springs and curved gaps added): {said}.", MIXED,
+        f"{len(wide)} of {len(rows)} scenes (absolute values of motion, springs and curved gaps added)"
+        f"{said and ':' + said[1:]}.", MIXED if wide else REPRODUCED,
         miss=f"time stepping leaves up to {wide[0][OPEN]:.1f} % of a scene's energy unaccounted for "
-             f"({wide[0]['scene']})")
+             f"({wide[0]['scene']})" if wide else "")
 
 
 def over_time(run: Run) -> Iterator[Row]:
