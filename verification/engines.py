@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import groupby, product
 from typing import Any
 
@@ -17,7 +16,7 @@ from iapb.errors import IapbError, MissingDependencyError
 from reference.simulators import FIXED_SCENES, SIMULATORS, FixedScene, Trajectory, find_simulator, fixed_scene
 from reference.simulators.trajectory import deepest_overlap
 from verification.check import Check, Study, Topic
-from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, attempt, check_depth
+from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, check_depth, counted, of_each
 from verification.table import Row, Table
 
 OWN, MATCHED = SETTINGS = ("own", "matched")
@@ -74,12 +73,9 @@ def compare_engines(
     If an engine's own settings equal the matched ones, one run gives both records.
     """
     check_depth(depth)
-    pairs, records = list(product(engines or SIMULATORS, scenes or FIXED_SCENES)), list[EngineRecord]()
-    for done, (name, scene) in enumerate(pairs, 1):
-        records += attempt(f"{name} on {scene}", partial(_both, name, scene, depth), failures) or []
-        if progress is not None:
-            progress(done, len(pairs))
-    return records
+    pairs = list(product(engines or SIMULATORS, scenes or FIXED_SCENES))
+    return list(of_each(counted(pairs, progress) if progress else pairs, lambda pair: _both(*pair, depth), failures,
+                        lambda pair: f"{pair[0]} on {pair[1]}"))  # fmt: skip
 
 
 def _both(name: str, scene_name: str, depth: str) -> list[EngineRecord]:

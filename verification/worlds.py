@@ -252,7 +252,7 @@ def compare_impacts(
     stored = [StoredProblem(problem, format="built here") for problem in problems]
     study = study_read(f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures)
     # IAPB's impacts equal those of the Newton LCP if all contacts push
-    compared = compare_cases(impacts_of_run(run, scene).cases[:CASES], failures=failures)
+    compared = compare_cases(impacts_of_run(run, scene)[0][:CASES], failures=failures)
     agree, push = (sum(one[key] for one in compared) for key in ("agrees", "pushes"))
     moves = (f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
              f"{len(compared) - push} an impulse pulls. The largest distance is "

@@ -19,7 +19,7 @@ slower contact pulls. Neither the restitution nor any other component of the vel
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import product
 from typing import Any
@@ -47,7 +47,6 @@ PUSHED = 1e-11
 APPROACHING = 1e-9
 # M(v⁺−v⁻) lies in range(Jᵀ) up to the rounding of two solves with M; condition numbers reach 1e4 in the families.
 MOMENTUM = 1e-9
-Resolver = Callable[[ImpactCase], tuple[np.ndarray, np.ndarray]]
 
 
 def iapb(case: ImpactCase) -> tuple[np.ndarray, np.ndarray]:
@@ -56,8 +55,8 @@ def iapb(case: ImpactCase) -> tuple[np.ndarray, np.ndarray]:
     return impact.velocity, impact.impulses
 
 
-def compare_case(case: ImpactCase, resolver: Resolver = iapb) -> dict[str, Any]:
-    """Compare a resolver's outcome with the Newton LCP's on one case.
+def compare_case(case: ImpactCase) -> dict[str, Any]:
+    """Compare IAPB's outcome with the Newton LCP's on one case.
 
     Returns
     -------
@@ -78,7 +77,7 @@ def compare_case(case: ImpactCase, resolver: Resolver = iapb) -> dict[str, Any]:
         The law's own solver leaves a residual, so there is no solution to compare with.
     """
     problem = ImpactProblem.from_impact(*case.arrays, case.restitution)
-    v, p = resolver(case)
+    v, p = iapb(case)
     law = newton_lcp(problem).velocity
     upper, e = case.lower.T, case.restitution
     before, change = upper @ case.velocity, upper @ (v - case.velocity)
@@ -127,12 +126,10 @@ def _outside(rows: np.ndarray, change: np.ndarray) -> float:
     return float(np.linalg.norm(change - inside)) / size
 
 
-def compare_cases(
-    cases: Iterable[ImpactCase], resolver: Resolver = iapb, failures: list[Failure] | None = None
-) -> list[dict[str, Any]]:
+def compare_cases(cases: Iterable[ImpactCase], failures: list[Failure] | None = None) -> list[dict[str, Any]]:
     """Return `compare_case` of every case; `failures` receives the cases that raise an exception."""
     found = (attempt(f"{case.family}, e = {case.restitution:g}, impact {number}",
-                     partial(compare_case, case, resolver), failures)
+                     partial(compare_case, case), failures)
              for number, case in enumerate(cases, 1))  # fmt: skip
     return [row for row in found if row is not None]
 
@@ -172,7 +169,7 @@ SCENE_RESTITUTIONS = (None, 0.5)  # e of the scene (None), and e = 0.5, which gi
 def _compared(study: Study, name: str) -> Iterator[Row]:
     """Return the rows of a family or of a scene."""
     cases = random_cases(COUNTS[study.depth], families=[name]) if name in FAMILIES else (
-        case for e in SCENE_RESTITUTIONS for case in scene_impacts(name, restitution=e).cases)
+        case for e in SCENE_RESTITUTIONS for case in scene_impacts(name, e))
     return map_rows(compare_cases(cases, failures=study.failures))
 
 

@@ -25,19 +25,9 @@ from verification.impacts import Floats, ImpactCase
 _REBUILT = 1e-9
 
 
-class SceneImpacts(NamedTuple):
-    """The cases of one run: one case for each step and each contact group that collides in the step.
-
-    `left_out` counts the impacts that have no case: impacts with per-body rows, unequal restitution or friction, and
-    impacts scaled by a device limit.
-    """
-
-    cases: tuple[ImpactCase, ...]
-    left_out: int
-
-
-def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
-    """Return the impacts of an IAPB run as cases.
+def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]:
+    """Return the impacts of an IAPB run as cases, one for each step and contact group that collides, and the number of
+    impacts without a case: with per-body rows, unequal restitution or friction, or scaled by a device limit.
 
     Raises
     ------
@@ -64,7 +54,7 @@ def impacts_of_run(run: Run, scene: Scene) -> SceneImpacts:
             raise IapbError(f"the impact in step {blow.step} of {run.scene_name}, rebuilt from its run, has other "
                             "velocities than recorded; simulate the run again")
         cases.append(case)
-    return SceneImpacts(tuple(cases), left_out)
+    return tuple(cases), left_out
 
 
 def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProblem, ...], int]:
@@ -74,22 +64,22 @@ def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProb
     has friction, each impact gives two problems, without and with friction. IAPB's own impacts have no friction.
     """
     mechanism, mu = mechanism_of(scene), scene.contact.friction
-    found = impacts_of_run(run, scene)
-    if not found.cases:
-        return (), found.left_out
+    found, left_out = impacts_of_run(run, scene)
+    if not found:
+        return (), left_out
     taken = [blow for blow in _group_impacts(run, mechanism) if not blow.scaled]
-    widest = max(range(len(taken)), key=lambda k: found.cases[k].contacts)
+    widest = max(range(len(taken)), key=lambda k: found[k].contacts)
     spread = np.linspace(0, len(taken) - 1, most - 1).round().astype(int).tolist()
     problems = []
     for k in sorted({widest, *spread}):
-        (mass, normals, v), e = found.cases[k].arrays, found.cases[k].restitution
+        (mass, normals, v), e = found[k].arrays, found[k].restitution
         name = f"impact {k + 1} at {run.time[taken[k].step]:.4g} s"
         problems.append(ImpactProblem.from_impact(mass, normals, v, e, name=name))
         if mu > 0.0:
             rows = _with_tangents(run, scene, mechanism, taken[k])
             problems.append(ImpactProblem.from_impact(mass, rows.reshape(-1, mechanism.nv), v, e, mu,
                                                       contact_size=rows.shape[1], name=f"{name}, μ = {mu:g}"))
-    return tuple(problems), found.left_out
+    return tuple(problems), left_out
 
 
 def _with_tangents(run: Run, scene: Scene, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
@@ -151,9 +141,9 @@ def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact, directions
     return rows
 
 
-def scene_impacts(name: str, world: str = "IAPB", restitution: float | None = None) -> SceneImpacts:
+def scene_impacts(name: str, restitution: float | None = None) -> tuple[ImpactCase, ...]:
     """Simulate a scene of the project and return its impacts as cases."""
     scene = load_scene(find_scene(name))
     if restitution is not None:
         scene = scene.with_values({"contact.restitution": restitution})
-    return impacts_of_run(run_world(scene, world), scene)
+    return impacts_of_run(run_world(scene, "IAPB"), scene)[0]

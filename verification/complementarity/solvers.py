@@ -196,7 +196,7 @@ def _hard(name: str) -> tuple[Any, ...]:
 
 def _widest(scene: str) -> tuple[Any, ...]:
     """Return the impact of a scene with the most contacts."""
-    return _given(max(scene_impacts(scene).cases, key=lambda case: case.contacts))
+    return _given(max(scene_impacts(scene), key=lambda case: case.contacts))
 
 
 def _rough_patch(contacts: int, mu: float) -> tuple[Any, ...]:

@@ -16,7 +16,7 @@ the curves of each method.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, inf, pi, sin, sqrt
@@ -134,12 +134,12 @@ _LEAST_FALL = 3.0  # with a smaller fall of the error it is said to stay
 
 @dataclass(frozen=True)
 class Curve:
-    """The runs of one method on one scene, each list from the coarsest step to the finest.
+    """One method on one scene; runs are in the order of their steps, from the coarsest to the finest.
 
     Attributes
     ----------
-    used : runs along which the error falls, from which `words` are computed; () if the error falls less than threefold.
-    left_out : the other runs: before the error falls, after it stops falling, or exact by chance (`by_chance`).
+    runs : all runs.
+    used : those along which the error falls, for `words`; () if it falls less than threefold.
     cost : factor in computing time for a tenth of the error, fitted to `used`; None if these are too few (FIT_RUNS) or
         span too little (FIT_FALL).
     front : runs with a useful error such that no other run of the scene is better in both time and error.
@@ -150,8 +150,8 @@ class Curve:
 
     scene: str
     method: str
+    runs: tuple[Record, ...]
     used: tuple[Record, ...]
-    left_out: tuple[Record, ...]
     cost: float | None
     front: tuple[Record, ...]
     least: float
@@ -159,9 +159,9 @@ class Curve:
     cut_short: bool
 
     @property
-    def runs(self) -> list[Record]:
-        """All runs, coarse to fine."""
-        return _by_step((*self.used, *self.left_out))
+    def left_out(self) -> list[Record]:
+        """The other runs: before the error falls, after it stops falling, or exact by chance (`by_chance`)."""
+        return [run for run in self.runs if run not in self.used]
 
     @property
     def words(self) -> str:
@@ -180,10 +180,6 @@ def times(factor: float) -> str:
     return f"{factor:.2g}×" if factor < 10.0 else f"{factor:.0f}×"
 
 
-def _by_step(runs: Iterable[Record]) -> list[Record]:
-    return sorted(runs, key=lambda run: -float(run["step"]))
-
-
 def by_chance(run: Row) -> bool:
     """Whether the error of position is below the truth's own bound, because the step meets the instants of impact."""
     return "position" in run["note"] and str(run["note"]).endswith(BELOW)
@@ -193,8 +189,8 @@ def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
     """Return a curve for each scene and each of these methods that has a run; fronts compare only these methods."""
     found: list[Curve] = []
     for scene in dict.fromkeys(motions.column("scene")):
-        here = _by_step(run for run in motions.where(scene=scene, outcome=OK).records()
-                        if run["method"] in methods and run["time"] > 0.0)  # fmt: skip
+        here = sorted((run for run in motions.where(scene=scene, outcome=OK).records()
+                       if run["method"] in methods and run["time"] > 0.0), key=lambda run: -float(run["step"]))
         honest = [run for run in here if not by_chance(run)]
         for method in methods:
             runs = [run for run in honest if run["method"] == method]
@@ -204,8 +200,7 @@ def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
             used = kept if kept[0]["position"] >= _LEAST_FALL * kept[-1]["position"] else []
             late = bool(motions.where(scene=scene, method=method, outcome=TIMED_OUT).rows)
             found.append(Curve(
-                scene, method, tuple(used),
-                tuple(run for run in here if run["method"] == method and run not in used), tenfold_cost(used),
+                scene, method, tuple(run for run in here if run["method"] == method), tuple(used), tenfold_cost(used),
                 tuple(run for run in runs if run["position"] <= USEFUL and on_front(run, honest)),
                 float(min(run["position"] for run in runs)),
                 not used and late and len(kept) == len(runs), late and kept[-1] is runs[-1]))

@@ -23,8 +23,8 @@ from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of
+from reference import Floats
 
-Floats = NDArray[np.float64]
 Book = Mapping[str, float]
 
 ROUNDING = 1e-12  # share of the total energy that bounds the rounding of some thousand sums in double precision

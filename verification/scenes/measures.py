@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.run import Run
-
-Floats = NDArray[np.float64]
+from reference import Floats
 
 COORDINATES = ("x", "y", "theta")
 HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from reference import Floats
+
 PENALTY, IMPULSES = LAWS = ("penalty", "impulses")
 SETTLES, BOUNCES_ON, GROWS = "+", "o", "x"  # the marks of a wall: the mass settles, keeps bouncing, moves ever more
 PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]

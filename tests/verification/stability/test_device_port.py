@@ -1,4 +1,4 @@
-"""The hand's port of whole device loops: the coupler's bound is sharp, and what lies beyond it leaks."""
+"""The hand's port of whole device loops: the coupler's bound is sharp, and what lies beyond it leaks; what is said."""
 
 from __future__ import annotations
 
@@ -7,17 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from verification.check import Study
+from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.stability import device_port
 from verification.stability.device_port import (
+    CROSSES,
     HALF,
+    PORT,
     PRESSES,
     SENSORS,
     DeviceLoop,
     MovedDevice,
     actuator_forces,
+    coordinated,
+    coupled,
     hand_positions,
     leaked,
     needed_damping,
 )
+from verification.stability.peg import PEG, peg
 
 COUPLED = DeviceLoop("CBuc", 1000.0, 0.0)
 
@@ -70,3 +78,34 @@ def test_sensors_are_coarse_and_late() -> None:
     reading = device.read()
     assert reading.q[0] == pytest.approx(1e-5, rel=1e-12) and reading.v[0] == pytest.approx(1e-5 / loop.dt, rel=1e-12)
     assert device.held_forces(delay).tolist() == [0.0, 1.0]
+
+
+@pytest.fixture
+def leaks(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, object]]:
+    """Rows of made-up loops: damping needed, as a share of the bound."""
+    monkeypatch.setitem(device_port.SPEEDS, "quick", (1.0,))
+    found = []
+    for world, sensors, kind, share in (
+        ("CBuc", "ideal", PRESSES, 0.9), ("CBuc", "ideal", CROSSES, 2.0), ("CBuc", "late", PRESSES, 4.0),
+        ("PB", "ideal", PRESSES, 70.0 / COUPLED.bound),
+    ):
+        monkeypatch.setattr(device_port, "needed_damping", lambda *_, b=share * COUPLED.bound: b)
+        found.append(PORT.row(Study(), ((world, 1000.0, 0.0), sensors, kind)))
+    return found
+
+
+def test_a_pressing_hand_that_needs_more_than_the_bound_refutes_it(leaks) -> None:
+    """A hand that crosses the surface needs more than the bound, so that energy comes out at it."""
+    assert coupled(PORT.table_of(leaks)).verdict == MIXED
+    assert "70 to 70 N s/m" in coordinated(PORT.table_of(leaks)).sentence
+    leaks[0]["needed / bound"] = 1.001
+    assert coupled(PORT.table_of(leaks)).verdict == REFUTED
+    assert leaks[1]["leak at the bound [mJ]"] > 0.0 and 0.0 < leaks[1]["leak / energy exchanged"] < 1.0
+
+
+@pytest.mark.parametrize(("times", "verdict"), [
+    ((2.0, 1.0, 2.0, 2.0), REPRODUCED), ((None, 1.0, 1.0, 2.0), MIXED), ((1.0, 2.0, 1.0, None), REFUTED),
+    ((None, None, None, None), NOT_TESTABLE),
+])
+def test_the_peg_rests_no_later_with_impulses(times, verdict) -> None:
+    assert peg(PEG.table_of({"settles after [s]": time, "bounces": 1} for time in times)).verdict == verdict
