@@ -19,7 +19,7 @@ slower contact pulls. Neither the restitution nor any other component of the vel
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import product
 from typing import Any
@@ -173,42 +173,29 @@ def _compared(study: Study, name: str) -> Iterator[Row]:
     return map_rows(compare_cases(cases, failures=study.failures))
 
 
-def _map_says(table: Table) -> list[Part]:
-    """Return the parts on the statements, on the project's scenes, and on contacts that touch without approaching."""
+def _map_says(table: Table) -> Iterator[Part]:
+    """Yield the parts on the statements, on the project's scenes, and on contacts that touch without approaching."""
     rows = table.records()
-    scenes = [row for row in rows if row["impacts"].startswith("scene ")]
-    families = {name: [row for row in rows if row["impacts"] == name] for name in FAMILIES}
-    whole = ", ".join(sorted(name for name, found in families.items() if _agreement(found) == 1.0))
-    parts = [Part(
+    yield Part(
         "With equal e the two laws agree if and only if some p >= 0 gives IAPB's velocity; "
-        f"{sum(table['contradictions'])} of {sum(table['cases'])} impacts contradict this. "
-        "Where they differ, the distance is that of IAPB's impulse from the cone of pushing impulses, and IAPB loses ½ "
-        f"(1−e)/(1+e) · distance² more (to {max(table['defect']):.0e}), at most "
-        f"{max(table['largest extra loss of KE⁻']):.0%} of KE⁻. They agree in all impacts of: {whole}.",
-        "", "statements")]  # fmt: skip
-    if scenes:
+        f"{sum(table['contradictions'])} of {sum(table['cases'])} impacts contradict this. Where they differ, "
+        f"IAPB loses ½ (1−e)/(1+e) · distance² more (to {max(table['defect']):.0e}), at most "
+        f"{max(table['largest extra loss of KE⁻']):.0%} of KE⁻.", "", "statements")  # fmt: skip
+    if scenes := [row for row in rows if row["impacts"].startswith("scene ")]:
         apart = sorted({row["impacts"].removeprefix("scene ") for row in scenes if row["share that agrees"] < 1.0})
-        where = f"the laws differ in {', '.join(apart)}" if apart else "the laws agree in all"
-        pulling, chosen = (sum(round(row[f"share that {kind}"] * row["cases"]) for row in scenes)
-                           for kind in ("truly pulls", "pulls as chosen"))  # fmt: skip
-        parts.append(Part(
+        pulling = sum(round(row["share that truly pulls"] * row["cases"]) for row in scenes)
+        yield Part(
             f"Impacts of the project's scenes, each run with its own e and with e = {SCENE_RESTITUTIONS[1]:g}: "
-            f"{sum(row['cases'] for row in scenes)}; {where}. {pulling} impacts need a pulling impulse (no p >= 0 "
-            f"gives their velocity); {chosen} have one only in the least-norm p.",
-            MIXED if apart else REPRODUCED, "scenes"))  # fmt: skip
-    if beside := families["with a neighbour"]:
-        ours, theirs = (float(np.mean([row[f"left approaching by {law}"] for row in beside]))
-                        for law in ("IAPB", "the LCP"))  # fmt: skip
-        parts.append(Part(
+            f"{sum(row['cases'] for row in scenes)}, of which {pulling} need a pulling impulse (no p >= 0 gives their "
+            f"velocity). The laws {'differ in ' + ', '.join(apart) if apart else 'agree in all'}.",
+            MIXED if apart else REPRODUCED, "scenes")  # fmt: skip
+    beside = table.where(impacts="with a neighbour")
+    if beside.rows:
+        ours, theirs = (float(np.mean(beside[f"left approaching by {law}"])) for law in ("IAPB", "the LCP"))
+        yield Part(
             "A neighbouring contact that touches without approaching has no row in (19). After the impact it "
             f"approaches in {100 * ours:.0f} % of such impacts with IAPB, and in {100 * theirs:.0f} % with the LCP on "
-            "the same rows.", verdict_of_share(1.0 - ours), "touching"))  # fmt: skip
-    return parts
-
-
-def _agreement(rows: Sequence[Row]) -> float:
-    """Return the share of all impacts in which the laws agree."""
-    return sum(row["share that agrees"] * row["cases"] for row in rows) / (sum(row["cases"] for row in rows) or 1)
+            "the same rows.", verdict_of_share(1.0 - ours), "touching")  # fmt: skip
 
 
 MAP = Check(
