@@ -161,8 +161,9 @@ def sentence(rows: Sequence[Row]) -> str:
     """Return the results of one engine at one choice of settings in one sentence, from its rows."""
     first, missed = rows[0], ", ".join(f"{row['scene']} ({_worst(row)})" for row in rows if row["law"] != MET)
     at = "with its own settings" if first["settings"] == OWN else f"with a step of {1e3 * MATCHED_STEP:g} ms"
+    rise = max(row["largest rise of energy"] or 0.0 for row in rows)
     return (f"{first['engine']} {first['version']}, {at}, gives the known outcome in {_met(rows)} of {len(rows)} "
-            f"scenes{missed and f'; it misses it in {missed}'}.")  # fmt: skip
+            f"scenes{missed and f'; it misses it in {missed}'}. Energy rises by at most {rise:.2g}.")  # fmt: skip
 
 
 def _worst(row: Row) -> str:
