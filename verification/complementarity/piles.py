@@ -144,9 +144,7 @@ def _says(table: Table) -> Part:
         f"{agree:.0f} of {piles} impacts, and in none with more than {limit} contacts. Do not use (19) where more than "
         f"{limit} contacts collide at once: there {pulling:.0f} % of the impulses pull. With impulses that only push "
         "(method \"poisson\", world IAPB-push) the velocity equals the LCP's to "
-        f"{max(table['pushing from the LCP']):.0e}, and the energy changes by at most "
-        f"{max(table['largest change of KE']):.0e} KE⁻. Non-negative least squares contradicts this in "
-        f"{sum(table['contradicted by least squares'])} impacts.",
+        f"{max(table['pushing from the LCP']):.0e}.",
         verdict_of_share(agree / piles), "piles",
         miss=f"beyond {limit} contacts at once {pulling:.0f} % of IAPB's impulses pull")  # fmt: skip
 

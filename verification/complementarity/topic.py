@@ -51,13 +51,13 @@ def complementarity(folders: Mapping[str, Path], worlds: Iterable[str] = ()) -> 
 
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
-    rows = tables["map"].records()
-    cases = sum(row["cases"] for row in rows) or 1
-    agree = sum(row["share that agrees"] * row["cases"] for row in rows) / cases
+    found = tables["map"]
+    cases = sum(found["cases"]) or 1
+    agree = sum(row["share that agrees"] * row["cases"] for row in found.records()) / cases
     held = sum(part.verdict == REPRODUCED for part in parts)
     return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree exactly "
             f"where pushing impulses (p >= 0) can produce IAPB's velocity "
-            f"({sum(row['contradictions'] for row in rows)} exceptions). {held} of {len(parts)} findings are "
+            f"({sum(found['contradictions'])} exceptions). {held} of {len(parts)} findings are "
             "reproduced without restriction.")
 
 

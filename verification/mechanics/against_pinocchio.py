@@ -48,13 +48,8 @@ KIND_SIZES = (1, 6)  # number of joints of a tree with one kind of joint
 WRITTEN = {"quick": 4, "full": 40}  # URDF texts of each size
 WRITTEN_SIZES = (3, 8, 20)
 Pairs = list[tuple[Mechanism, PinocchioMechanism]]
+Pair = tuple[Any, Any]  # a quantity of ours, and of the reference
 
-# column of the table -> the quantities whose largest difference it has
-QUANTITIES = {
-    "mass matrix": ("mass_matrix",), "placements and Jacobians": ("placement", "frame_jacobian", "point_jacobian"),
-    "bias": ("bias",), "gravity": ("gravity",), "inverse dynamics": ("inverse_dynamics",),
-    "energies": ("kinetic_energy", "potential_energy"), "momentum": ("momentum",),
-}  # fmt: skip
 TOLERANCE = (
     f"{AGREEMENT:g} of the reference's largest entry, for two algorithms that are each accurate to about 1e-14. A bias "
     "or potential energy that nearly vanishes is compared with the size of the terms in its sum"
@@ -142,8 +137,7 @@ def _rows(_: Study, case: Case) -> Iterator[Row]:
         label = f"{len(pairs)} {case.label}" if case.set == TREES_SET else case.label
         yield {"set": case.set, "mechanism": label, "base": case.base,
                "velocities": max(mechanism.nv for mechanism, _model in pairs), "states": STATES * len(pairs),
-               **{title: max(largest[name] for name in names) for title, names in QUANTITIES.items()},
-               "worst": max(largest.values())}  # fmt: skip
+               **largest, "worst": max(largest.values())}  # fmt: skip
 
 
 TYPES = ("revolute", "continuous", "prismatic", "floating", "fixed")
@@ -199,25 +193,23 @@ def compare(
     twice the kinetic energy. Point Jacobians are compared at a point one metre off each body's origin.
     """
     m, p, dv = mechanism, reference, np.cos(np.arange(mechanism.nv))
-    pairs: dict[str, list[tuple[Any, Any]]] = {
-        "mass_matrix": [(m.mass_matrix(q), p.mass_matrix(q))], "bias": [(m.bias(q, v), p.bias(q, v))],
-        "gravity": [(m.gravity(q, gravity), p.gravity(q, gravity))],
-        "inverse_dynamics": [(m.inverse_dynamics(q, v, dv, gravity), p.inverse_dynamics(q, v, dv, gravity))],
-        "kinetic_energy": [(m.kinetic_energy(q, v), p.kinetic_energy(q, v))],
-        "potential_energy": [(m.potential_energy(q, gravity), p.potential_energy(q, gravity))],
-        "momentum": [(m.centroidal_momentum(q, v), p.centroidal_momentum(q, v))],
-        "placement": [], "point_jacobian": [], "frame_jacobian": [],
-    }  # fmt: skip
-    rotations, positions = m.placements(q)
+    (rotations, positions), off = m.placements(q), np.array([0.6, 0.0, -0.8])
+    places, frames, points = list[Pair](), list[Pair](), list[Pair]()
     for b, name in enumerate(m.names):
-        rotation, position = p.placement(q, name)
-        point = positions[b] + np.array([0.6, 0.0, -0.8])
-        pairs["placement"] += [(rotations[b], rotation), (positions[b], position)]
-        pairs["point_jacobian"] += [(m.point_jacobian(q, b, point), p.point_jacobian(q, name, point))]
-        pairs["frame_jacobian"] += [(m.frame_jacobian(q, b), p.frame_jacobian(q, name))]
-    lifted = float(np.linalg.norm(gravity)) * _spread(m, q)
-    floors = {"bias": _swung(m, q, v), "potential_energy": lifted}
-    return {name: relative_difference(found, floors.get(name, 0.0)) for name, found in pairs.items()}
+        places += zip((rotations[b], positions[b]), p.placement(q, name), strict=True)
+        frames += [(m.frame_jacobian(q, b), p.frame_jacobian(q, name))]
+        points += [(m.point_jacobian(q, b, positions[b] + off), p.point_jacobian(q, name, positions[b] + off))]
+    apart, lifted = relative_difference, float(np.linalg.norm(gravity)) * _spread(m, q)
+    return {
+        "mass matrix": apart([(m.mass_matrix(q), p.mass_matrix(q))]),
+        "placements and Jacobians": max(map(apart, (places, frames, points))),
+        "bias": apart([(m.bias(q, v), p.bias(q, v))], _swung(m, q, v)),
+        "gravity": apart([(m.gravity(q, gravity), p.gravity(q, gravity))]),
+        "inverse dynamics": apart([(m.inverse_dynamics(q, v, dv, gravity), p.inverse_dynamics(q, v, dv, gravity))]),
+        "energies": max(apart([(m.kinetic_energy(q, v), p.kinetic_energy(q, v))]),
+                        apart([(m.potential_energy(q, gravity), p.potential_energy(q, gravity))], lifted)),
+        "momentum": apart([(m.centroidal_momentum(q, v), p.centroidal_momentum(q, v))]),
+    }  # fmt: skip
 
 
 def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
@@ -233,7 +225,7 @@ def _spread(mechanism: Mechanism, q: Floats) -> float:
     return sum(body.mass * float(np.linalg.norm(p + R @ body.center_of_mass)) for body, R, p in bodies)
 
 
-def relative_difference(pairs: list[tuple[Any, Any]], floor: float = 0.0) -> float:
+def relative_difference(pairs: list[Pair], floor: float = 0.0) -> float:
     """Return the largest |ours - theirs| of all pairs, divided by the larger of `floor` and the largest |theirs|."""
     scale = max([floor, *(float(np.max(np.abs(theirs), initial=0.0)) for _, theirs in pairs)])
     gap = max([0.0, *(float(np.max(np.abs(ours - theirs), initial=0.0)) for ours, theirs in pairs)])

@@ -23,6 +23,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from itertools import product
+from operator import truediv
 from typing import Any
 
 import numpy as np
@@ -184,33 +185,29 @@ def _leak(study: Study, case: Case) -> dict[str, Any]:
 
 def coupled(ports: Table) -> Part:
     """Return the part on the coupler at a rigid wall: whether its bound prevents leaks, and which cases need more."""
-    rows = [row for row in ports.records() if row["world"] == COUPLER_WORLD]
-
-    def most(motion: str, ideal: bool) -> float:
-        return max(float(row["needed / bound"]) for row in rows
-                   if row["the hand"] == motion and (row["sensors"] == "ideal") == ideal)  # fmt: skip
-
-    pressing = most(PRESSES, True)
+    most: dict[tuple[str, bool], float] = {}
+    for row in ports.where(world=COUPLER_WORLD).records():
+        case = row["the hand"], row["sensors"] == "ideal"
+        most[case] = max(most.get(case, 0.0), row["needed / bound"])
     return Part(
-        f"In CBuc, with the tool on a rigid wall, a pressing hand and ideal sensors, the device is passive once its "
-        f"damping reaches {pressing:.4f} times b = KT/2 + |B| of the coupler. Late or coarse sensors need up to "
-        f"{most(PRESSES, False):.3g} times that damping. A hand that moves in and out of contact needs up to "
-        f"{most(CROSSES, True):.3g} times, because the coupler is already stretched when it switches on.",
-        MIXED if pressing <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
+        "In CBuc, with the tool on a rigid wall, a pressing hand and ideal sensors, the device is passive once its "
+        f"damping reaches {most[PRESSES, True]:.4f} times b = KT/2 + |B| of the coupler. Late or coarse sensors need "
+        f"up to {most[PRESSES, False]:.3g} times that damping. A hand that moves in and out of contact needs up to "
+        f"{most[CROSSES, True]:.3g} times, because the coupler is already stretched when it switches on.",
+        MIXED if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
 def coordinated(ports: Table) -> Part:
     """Return the part on the additional damping that the four-channel controller needs."""
-    rows = [row for row in ports.records() if row["world"] != COUPLER_WORLD]
-    needed = [row["damping needed"] for row in rows]
-    whole = max(row["damping needed"] / row["with the coordination's gains"] for row in rows)
+    found = ports.only(world != COUPLER_WORLD for world in ports["world"])
+    needed, sums = found["damping needed"], found["with the coordination's gains"]
     return Part(
         "With the four-channel controller the bound KT/2 + |B| of the wall alone is not enough: the device needs up to "
-        f"{max(row['needed / bound'] for row in rows):.3g} times as much damping, {min(needed):.3g} to "
-        f"{max(needed):.3g} N s/m, because the hand also feels the coordination's damping of {COORDINATION[1]:g} N "
-        f"s/m. The bound with the gains of wall and coordination added is not sufficient either: up to {whole:.3g} "
-        "times its value is needed. Colgate's bound does not apply here because the tool moves. The paper's device has "
-        "no damping.", MIXED)  # fmt: skip
+        f"{max(found['needed / bound']):.3g} times as much damping, {min(needed):.3g} to {max(needed):.3g} N s/m, "
+        f"because the hand also feels the coordination's damping of {COORDINATION[1]:g} N s/m. The bound with gains of "
+        "wall and coordination added is not sufficient either: up to "
+        f"{max(map(truediv, needed, sums)):.3g} times its value is needed. Colgate's bound does not apply here because "
+        "the tool moves. The paper's device has no damping.", MIXED)  # fmt: skip
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:
