@@ -304,11 +304,11 @@ CHOSEN = ("contacts", "coordinates", "budget [µs]", "method", "work", "time [µ
 
 def choices(measured: Table) -> Table:
     """Return the result of `choose` for every measured size and every budget."""
-    rows = []
-    for size, budget in product(dict.fromkeys(measured.select(("contacts", "coordinates")).rows), BUDGETS):
-        best, python = (choose(measured, budget, *size, called) for called in (COMPILED, PYTHON))
+    rows, sizes = [], dict.fromkeys(measured.select(("contacts", "coordinates")).rows)
+    for (contacts, coordinates), budget in product(sizes, BUDGETS):
+        best, python = (choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON))
         row = dict.fromkeys(CHOSEN) | {
-            "contacts": size[0], "coordinates": size[1], "budget [µs]": 1e6 * budget, "method": "none",
+            "contacts": contacts, "coordinates": coordinates, "budget [µs]": 1e6 * budget, "method": "none",
             "from Python": f"{python.method}, {short_time(python.time)}" if python and python.enough else "none"}
         if best and best.enough:
             row |= {"method": best.method, "work": best.work, "time [µs]": 1e6 * best.time, "error": best.error,

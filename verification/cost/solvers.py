@@ -45,7 +45,7 @@ def time_impact(study: Study, size: Size) -> Iterator[Row]:
     """Yield the times of every solver and of IAPB on one impact."""
     case = FAMILIES[size.family](size.contacts, np.random.default_rng([SEED, size.contacts]))
     too_slow: dict[tuple[str, str], float] = study.once("too slow", dict)
-    own = {KERNEL: calls.kernel_call, IAPB: calls.engine_call, PRINTED: calls.printed_call}
+    own: dict[str, Any] = {KERNEL: calls.kernel_call, IAPB: calls.engine_call, PRINTED: calls.printed_call}
     others = {LEMKE_KERNEL: calls.lemke_call, **{name: partial(calls.solver_call, name=name) for name in SOLVERS}}
     timed, answers, notes = dict[str, Call](), dict[str, Any](), dict[str, str]()
     with one_thread():
