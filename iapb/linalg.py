@@ -114,6 +114,15 @@ def dot_of(a, b):
 
 
 @kernel
+def all_finite(vector):
+    """Return whether a vector has no NaN and no infinity."""
+    sound = True
+    for k in range(vector.shape[0]):
+        sound = sound and math.isfinite(vector[k])
+    return sound
+
+
+@kernel
 def add_multiple(vector, factor, row):
     """Do vector += factor · row over the length of the vector."""
     for k in range(vector.shape[0]):

@@ -174,12 +174,10 @@ class System:
         for name, value in {"scale": 1, "clamp": 1, "friction_share": 1, "solved": 1, "approaching": -1}.items():
             log[name][:] = value  # where a law written in Python does not set it
         state = State(
-            **blank(quantities(State), {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows,
-                                        "root": 9 * trees}),
+            **blank(quantities(State), {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows}),
             body=make_workspace(len(mechanism.bodies), d), contacts=zeros_of(ContactBuffer, contact=c),
             previous=zeros_of(ContactBuffer, contact=c), stage_contacts=zeros_of(ContactBuffer, contact=c),
-            work=zeros_of(ImpactWork, velocity=d, row=rows),
-            push_work=zeros_of(PushWork, velocity=d, row=rows, passive=d + 1),
+            work=zeros_of(ImpactWork, velocity=d, row=rows), push_work=zeros_of(PushWork, velocity=d, row=rows),
             friction_work=zeros_of(FrictionWork, velocity=d * sliding, row=rows * sliding,
                                    tangent=rows * tangents * sliding, direction=tangents),
             rest_work=zeros_of(RestWork, velocity=d * soft, contact=c * soft, row=c * (1 + tangents) * soft,

@@ -249,8 +249,7 @@ def _resolve(arrays: Arrays, restitution: Floats, law: str, options: tuple[int |
 def _scratch(coordinates: int, contacts: int, tangents: int) -> Any:
     """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while it runs."""
     rows = max(1, contacts)
-    return block(zeros_of(ResolveWork, velocity=coordinates, passive=coordinates + 1, row=rows,
-                          tangent=rows * tangents, direction=tangents))
+    return block(zeros_of(ResolveWork, velocity=coordinates, row=rows, tangent=rows * tangents, direction=tangents))
 
 
 def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: bool) -> IapbError:

@@ -22,9 +22,6 @@ from iapb.run import COLLIDING, FREE, RESTING
 
 Floats = NDArray[np.float64]
 
-IMPULSE_AUGMENTED = "impulse-augmented penalty"
-PUSHING = "impulse-augmented penalty, contacts only push"
-WITH_IMPACT_FRICTION = "impulse-augmented penalty with impact friction"
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
 # Parts of a scene's contact section. A law's attribute `uses` names the parts that affect it.
@@ -158,7 +155,8 @@ class ImpulseAugmented(_EngineLaw):
     @property
     def name(self) -> str:
         """Name of the law; it says whether friction acts in impacts or contacts only push."""
-        return WITH_IMPACT_FRICTION if self.friction_in_impacts else PUSHING if self.pushing else IMPULSE_AUGMENTED
+        extra = " with impact friction" if self.friction_in_impacts else ", contacts only push" if self.pushing else ""
+        return f"impulse-augmented penalty{extra}"
 
     @property
     def uses(self) -> frozenset[str]:

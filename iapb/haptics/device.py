@@ -48,16 +48,16 @@ class SimulatedDevice:
     mass_matrix : (d, d)
         Symmetric positive definite [kg, kg m²].
     q, v : (d,)
-        Initial position and velocity; v defaults to zero.
+        Initial position and velocity.
     dt : float [s]
         Step length > 0.
-    damping : (d,), optional
-        Physical damping b [N s/m, N m s/rad]; default: none.
-    force_limit : (d,), optional
-        The actuators clip each component to ±limit [N, N m]; default: no limit.
+    damping : (d,)
+        Physical damping b >= 0 [N s/m, N m s/rad].
+    force_limit : (d,)
+        The actuators clip each component to ±limit [N, N m].
     delay : int
         Delay [steps] of readings on their way to the simulation, and of forces on their way to the actuators.
-    resolution : (d,), optional
+    resolution : (d,)
         Resolution of the position sensors [m, rad], 0 = exact. Above 0, the velocity reading is the difference
         of two successive position readings over dt: it changes in steps of resolution / dt.
 
@@ -69,30 +69,16 @@ class SimulatedDevice:
         Force of the hand on the device [N, N m]; it may be set at any time.
     """
 
-    def __init__(self, mass_matrix: ArrayLike, q: ArrayLike, v: ArrayLike | None = None, *, dt: float,
-                 damping: ArrayLike | None = None, force_limit: ArrayLike | None = None, delay: int = 0,
-                 resolution: ArrayLike | None = None) -> None:
+    def __init__(self, mass_matrix: ArrayLike, q: ArrayLike, v: ArrayLike = 0.0, *, dt: float, damping: ArrayLike = 0.0,
+                 force_limit: ArrayLike = np.inf, delay: int = 0, resolution: ArrayLike = 0.0) -> None:
         mass = np.array(mass_matrix, np.float64)
-        size = len(mass) if mass.ndim else 0
         self._lower = np.zeros_like(mass)
-        symmetric = mass.shape == (size, size) and np.all(np.isfinite(mass)) and np.array_equal(mass, mass.T)
-        if not symmetric or cholesky(mass, self._lower) != 0:
-            raise ArgumentError("mass_matrix", mass_matrix, "a finite symmetric positive definite matrix (d, d)")
-        self.q = finite_array("q", q, (size,))
-        self.v = np.zeros(size) if v is None else finite_array("v", v, (size,))
-        self.hand_force = np.zeros(size)
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise ArgumentError("dt", dt, "a step length > 0")
-        if delay < 0:
-            raise ArgumentError("delay", delay, "a number of steps >= 0")
-        self._dt = float(dt)
-        given = {"damping": (damping, 0.0), "force_limit": (force_limit, np.inf), "resolution": (resolution, 0.0)}
-        vectors = []
-        for name, (values, default) in given.items():
-            vectors.append(np.full(size, default) if values is None else np.array(values, np.float64))
-            if vectors[-1].shape != (size,) or not np.all(vectors[-1] >= 0.0):
-                raise ArgumentError(name, values, f"{size} numbers >= 0")
-        self._damping, self._limit, self._resolution = vectors
+        if cholesky(mass, self._lower) != 0:
+            raise ArgumentError("mass_matrix", mass_matrix, "a symmetric positive definite matrix (d, d)")
+        size = len(mass)
+        self.q, self.v, self.hand_force = np.full(size, q), np.full(size, v), np.zeros(size)
+        self._damping, self._limit, self._resolution = (np.full(size, x) for x in (damping, force_limit, resolution))
+        self._dt = dt
         self._readings = deque([DeviceReading(self._sensed(), self.v.copy())] * (delay + 1), delay + 1)
         self._forces = deque([np.zeros(size)] * delay)
 

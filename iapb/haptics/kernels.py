@@ -126,10 +126,22 @@ def sense(world, port, velocity):
 
 @kernel(needs="hand")
 def couple(world, state, port):
-    """Write the forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD."""
-    if port.tool_tree < 0:
+    """Write the forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD.
+
+    The hand acts on the tool and on the device, each at its own pose.
+    """
+    if not port.hand:
         return  # `applied` holds the zeros that it was made with
-    feel_hand(world, state, port)
+    port.hand_force[:] = port.device_hand_force[:] = 0.0
+    pushing = False
+    for k in range(port.wrench.shape[0]):
+        pushing = pushing or port.wrench[k] != 0.0
+    if pushing:
+        forward_kinematics(world.mechanism, state.q, state.body)
+        press(world.mechanism, state.body, port.hand_body, port, port.hand_force)
+        if port.coupling != NO_COUPLING:
+            forward_kinematics(port.mechanism, port.device_q, port.body)
+            press(port.mechanism, port.body, port.device_body, port, port.device_hand_force)
     if port.coupling != NO_COUPLING:
         measure(world, port)
         coordinate(state, port)
@@ -138,22 +150,6 @@ def couple(world, state, port):
     if port.coupling == UNILATERAL and port.engaged[0]:
         for k in range(port.v_start, port.v_stop):  # the hand reaches a coupled tool through the coupler only
             port.applied[k] = port.coupling_force[k]
-
-
-@kernel
-def feel_hand(world, state, port):
-    """Write the hand's J_hᵀF_h on the tool and on the device, each at its own pose; zeros if the wrench is zero."""
-    port.hand_force[:] = port.device_hand_force[:] = 0.0
-    pushing = False
-    for k in range(port.wrench.shape[0]):
-        pushing = pushing or port.wrench[k] != 0.0
-    if not pushing:
-        return
-    forward_kinematics(world.mechanism, state.q, state.body)
-    press(world.mechanism, state.body, port.hand_body, port, port.hand_force)
-    if port.coupling != NO_COUPLING:
-        forward_kinematics(port.mechanism, port.device_q, port.body)
-        press(port.mechanism, port.body, port.device_body, port, port.device_hand_force)
 
 
 @kernel

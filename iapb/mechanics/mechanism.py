@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from iapb import linalg
 from iapb.compiled import Block, Entry, block
 from iapb.errors import ArgumentError
 from iapb.mechanics import structure
 from iapb.mechanics.bodies import Body, finite_array, float_array, parents_and_trees
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.kernels import configuration, dynamics, evaluation, kinematics
-from iapb.mechanics.kernels.arrays import Evaluation, MechanismArrays, make_workspace
+from iapb.mechanics.kernels.arrays import MechanismArrays, make_workspace
 from iapb.mechanics.urdf import read_urdf
 from iapb.schema import Floats, Integers
 
@@ -32,7 +33,7 @@ def _entries_for(kind: Any) -> SimpleNamespace:
     """Return the kernels that Python calls with mechanisms of this type of block (see `Entry`)."""
     return SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
         configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
-        evaluation.all_finite, evaluation.biases_at, evaluation.centroidal_momentum, evaluation.displacements_along,
+        linalg.all_finite, evaluation.bias_at, evaluation.centroidal_momentum, evaluation.displacements_along,
         evaluation.energies_along, evaluation.mass_matrices_at, evaluation.misplaced_body, evaluation.poses_along,
         evaluation.rows_along, kinematics.forward_kinematics, kinematics.frame_jacobian)})
 
@@ -40,9 +41,9 @@ def _entries_for(kind: Any) -> SimpleNamespace:
 class _Scratch(threading.local):
     """Scratch memory of the kernels, for all bodies and for the moving parts alone; each thread has its own."""
 
-    def __init__(self, bodies: int, dofs: int, parts: MechanismArrays) -> None:
+    def __init__(self, bodies: int, parts: int, dofs: int) -> None:
         self.workspace: Block = block(make_workspace(bodies, dofs))
-        self.parts: Block = block(Evaluation(parts, make_workspace(len(parts.kind), dofs)))
+        self.parts: Block = block(make_workspace(parts, dofs))
 
 
 class Mechanism:
@@ -95,7 +96,8 @@ class Mechanism:
         starts = self.arrays.v_start[np.flatnonzero(np.diff(self.tree_of_body, prepend=-1))].tolist()
         self.tree_dofs: list[tuple[int, int]] = list(zip(starts, [*starts[1:], self.nv], strict=False))
         parts = structure.moving_parts(self.arrays)
-        self._scratch = _Scratch(len(self.bodies), self.nv, parts)
+        self._parts: Any = block(parts)
+        self._scratch = _Scratch(len(self.bodies), len(parts.kind), self.nv)
         self._alone: dict[int, Mechanism] = {}
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(parts)
         self.has_velocity_terms: bool = structure.has_velocity_terms(parts)
@@ -153,37 +155,27 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        place, out = float_array("q", q, (self.nq,)), np.empty((self.nv, self.nv))
-        if not self._entries.mass_matrices_at(self._scratch.parts, place, out):
+        place, out = float_array("q", q, (self.nq,)), np.empty((1, self.nv, self.nv))
+        if not self._entries.mass_matrices_at(self._parts, self._scratch.parts, place[None], out):
             self._place(place)
-        return out
+        return out[0]
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
         places = float_array("qs", qs, (-1, self.nq))
-        out = np.empty((len(places) * self.nv, self.nv))
-        if not self._entries.mass_matrices_at(self._scratch.parts, places.reshape(-1), out):
-            self._check_states(places)
-        return out.reshape(len(places), self.nv, self.nv)
+        out = np.empty((len(places), self.nv, self.nv))
+        if not self._entries.mass_matrices_at(self._parts, self._scratch.parts, places, out):
+            self._check_places(places)
+        return out
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
         place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
         out = np.empty(self.nv)
-        if not self._entries.biases_at(self._scratch.parts, place, rates, out):
+        if not self._entries.bias_at(self._parts, self._scratch.parts, place, rates, out):
             self._place(place)
             self._rates(rates)
         return out
-
-    def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
-        """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
-        places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
-        if len(places) != len(rates):
-            raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
-        out = np.empty(rates.size)
-        if not self._entries.biases_at(self._scratch.parts, places.reshape(-1), rates.reshape(-1), out):
-            self._check_states(places, rates)
-        return out.reshape(rates.shape)
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
@@ -215,7 +207,7 @@ class Mechanism:
             raise ArgumentError("bodies, points and directions", len(spots), f"{len(places)} each, as many as qs")
         if len(fixed_to) and not -1 <= fixed_to.min() <= fixed_to.max() < len(self.names):
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
-        self._check_states(places)
+        self._check_places(places)
         given = self._scratch.workspace, places, fixed_to, spots, along
         return self._filled((len(places), self.nv), self._entries.rows_along, *given)
 
@@ -275,8 +267,6 @@ class Mechanism:
             raise ArgumentError(f"{name} of body {self.names[b]!r}", place[of_unit], "entries of total length one")
         return place
 
-    def _check_states(self, places: Floats, rates: Floats | tuple[()] = ()) -> None:
+    def _check_places(self, places: Floats) -> None:
         for k, q in enumerate(places):
             self._place(q, f"qs[{k}]")
-        for k, v in enumerate(rates):
-            self._rates(v, f"vs[{k}]")

@@ -43,7 +43,6 @@ _ATTRIBUTES: dict[str, tuple[str, ...]] = {
 _MANY = ("link", "joint", "collision", *LENGTHS)  # an element may hold several of these
 _NEAR = 0.75  # share of letters that agree: inertail and colision are errors, contact and visual are other words
 MAX_BYTES = 10_000_000  # the largest known robot file has a tenth of this
-MAX_DEPTH = 32  # of open elements: a URDF has five levels, a malicious file could nest without limit
 
 
 def read_urdf(path: str | Path, floating_base: bool = False) -> list[Body]:
@@ -157,19 +156,7 @@ def _shape(collision: ElementTree.Element, where: str) -> CollisionShape:
 
 
 class _Builder(ElementTree.TreeBuilder):
-    """Builds the elements of a file, but refuses what a malicious one could contain."""
-
-    depth = 0
-
-    def start(self, tag: Any, attrs: Any) -> ElementTree.Element:
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise ArgumentError("URDF file", f"{self.depth} levels", f"at most {MAX_DEPTH} levels of elements")
-        return super().start(tag, attrs)
-
-    def end(self, tag: str) -> ElementTree.Element:
-        self.depth -= 1
-        return super().end(tag)
+    """Builds the elements of a file, but refuses entities, which a malicious one could contain."""
 
     def doctype(self, *_: object) -> NoReturn:
         raise ArgumentError("URDF file", "<!DOCTYPE", "no <!DOCTYPE>: its entities can expand without limit")

@@ -57,9 +57,7 @@ def simulated_device(scene: Scene) -> SimulatedDevice:
     q, v = state.q[slice(*system.tool_coordinates)], state.v[slice(*system.tool_dofs)]
     if not tool.has_constant_mass_matrix or len(q) != len(v):
         raise ArgumentError("scene", scene.name, "a tool of constant inertia, with as many velocities as coordinates")
-    given = scene.device
-    settings: dict[str, Any] = {} if given is None else {
-        "damping": given.damping, "force_limit": given.force_limit, "delay": given.delay,
-        "resolution": given.position_resolution,
-    }  # fmt: skip
+    fields = {"damping": "damping", "force_limit": "force_limit", "delay": "delay", "position_resolution": "resolution"}
+    given = {name: getattr(scene.device, field, None) for field, name in fields.items()}
+    settings: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     return SimulatedDevice(tool.mass_matrix(q), q, v, dt=system.dt, **settings)

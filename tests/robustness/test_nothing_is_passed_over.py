@@ -69,9 +69,8 @@ def test_no_element_of_a_robot_can_be_misspelt(tag: str, tmp_path: Path) -> None
     ("<link name='a'><inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/>"
      "<origin xzy='1 0 0'/></inertial></link>", "xzy"),
     ("<link name='a'><inertial/><inertial/></link>", "twice"),
-    ("<link name='a'/>" + "<x>" * 40 + "</x>" * 40, "levels"),
 ])  # fmt: skip
-def test_slips_and_endless_depth_of_a_robot_are_named(text: str, said: str, tmp_path: Path) -> None:
+def test_slips_of_a_robot_are_named(text: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "robot.urdf").write_text(f"<robot name='r'>{text}</robot>")
     with pytest.raises(ArgumentError, match=said):
         read_urdf(tmp_path / "robot.urdf")

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from iapb import resolve_impact
-from iapb.compiled import block, kernel
-from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
+from iapb.compiled import block, copy_into, kernel
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance, whiten_impact
 from iapb.errors import MissingDependencyError, SolverError
 from iapb.linalg import add_multiple, cholesky, dot_of, from_whitened, to_whitened
 from iapb.schema import zeros_of
@@ -66,8 +66,9 @@ def kernel_call(case: ImpactCase, budget: int | None = None) -> KernelCall:
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     work = block(zeros_of(ImpactWork, velocity=d, row=c))
-    return KernelCall(repeat_impact, (mass, np.zeros((d, d)), v, case.restitution, np.ascontiguousarray(rows.T),
-                                      d if budget is None else budget, work, np.zeros(d)), np.zeros(d))  # fmt: skip
+    work.mass[:], work.v[:] = mass, v
+    return KernelCall(repeat_impact, (case.restitution, np.ascontiguousarray(rows.T), d if budget is None else budget,
+                                      work), np.zeros(d))  # fmt: skip
 
 
 def sweeps_call(case: ImpactCase, sweeps: int) -> KernelCall:
@@ -118,18 +119,17 @@ def daqp_call(case: ImpactCase) -> Call:
 
 
 @kernel
-def repeat_impact(  # type: ignore[no-untyped-def]
-    mass_matrix, lower, v, restitution, columns, budget, work, momentum, v_plus, times
-):
+def repeat_impact(restitution, columns, budget, work, v_plus, times):  # type: ignore[no-untyped-def]
     """Repeat `times` times: factor M, copy the rows and resolve the impact with at most `budget` rows."""
     d, count = columns.shape
     for _ in range(times):
-        cholesky(mass_matrix, lower)
+        cholesky(work.mass, work.lower)
         for k in range(d):
             for i in range(count):
                 work.columns[k, i] = columns[k, i]
-        factored_impact(mass_matrix, lower, v, restitution, count, rank_tolerance(lower), budget, True, work,
-                        v_plus, momentum)
+        whiten_impact(d, count, work)
+        factored_impact(d, count, restitution, rank_tolerance(work.lower), budget, True, work)
+    copy_into(v_plus, work.v_plus)
 
 
 @kernel

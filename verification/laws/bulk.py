@@ -16,7 +16,7 @@ import numpy as np
 from iapb import resolve_impacts
 from iapb.advice.certificate import judge_gains
 from iapb.compiled import block, copy_into, kernel
-from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance, whiten_impact
 from iapb.contact.kernels.passive import gain
 from iapb.double_double import kinetic_energies
 from iapb.linalg import cholesky
@@ -173,23 +173,25 @@ def resolved(given: Impacts, clamped: bool = True, *, scale: bool = False) -> tu
     d, c = given.columns.shape[1:]
     v_plus, clamps = np.empty_like(given.v), np.empty(len(given.v))
     work = block(zeros_of(ImpactWork, velocity=d, row=c))
-    _resolve_all(*given[:4], clamped, np.empty((d, d)), work, np.empty(d), v_plus, clamps)
+    _resolve_all(*given[:4], clamped, work, v_plus, clamps)
     return v_plus, clamps
 
 
 @kernel
-def _resolve_all(mass, columns, v, restitution, clamped, lower, work, momentum, v_plus, clamps):  # type: ignore[no-untyped-def]
+def _resolve_all(mass, columns, v, restitution, clamped, work, v_plus, clamps):  # type: ignore[no-untyped-def]
     n, d, c = columns.shape
     for k in range(n):
         for i in range(d):
-            for j in range(c):
-                work.columns[i, j] = columns[k, i, j]
-        if cholesky(mass[k], lower) != 0:
+            copy_into(work.mass[i], mass[k, i])
+            copy_into(work.columns[i], columns[k, i])
+        if cholesky(mass[k], work.lower) != 0:
             clamps[k] = -1.0
             copy_into(v_plus[k], v[k])
             continue
-        clamps[k] = factored_impact(mass[k], lower, v[k], restitution[k], c, rank_tolerance(lower), d, clamped, work,
-                                    v_plus[k], momentum)[1]
+        copy_into(work.v, v[k])
+        whiten_impact(d, c, work)
+        clamps[k] = factored_impact(d, c, restitution[k], rank_tolerance(work.lower), d, clamped, work)[1]
+        copy_into(v_plus[k], work.v_plus)
 
 
 @kernel

@@ -1,8 +1,8 @@
 """Broad phase: find the pairs of shapes whose bounding spheres overlap, at a cost linear in the moving shapes.
 
 Moving shapes are sorted into the cells of a uniform grid. A cell is as wide as the largest moving shape, so two shapes
-can touch only in the same cell or in neighbouring cells. A hash table with counted buckets finds the cells (no list,
-no allocation). Every moving shape is compared with every static one, which is linear in the moving shapes too.
+can touch only in the same cell or in neighbouring cells. A hash table of chains finds the cells. Every moving shape is
+compared with every static one, which is linear in the moving shapes too.
 
 The pairs keep the order of the candidate pairs, so a scene gives the same bits with and without the broad phase.
 """
@@ -38,9 +38,8 @@ class BroadPhase(NamedTuple):
     neighbours: int  # cells to look at: 9 in the plane, 27 in space
     center: Annotated[Floats, "shape 3"]  # [m] world; those of static shapes are constant
     cell: Annotated[Integers, "moving 3"]
-    bucket: Annotated[Integers, "moving"]
-    start: Annotated[Integers, "bucket"]  # one more than there are buckets
-    sorted: Annotated[Integers, "moving"]
+    first: Annotated[Integers, "bucket"]  # a moving shape with its cell in this bucket, −1 = none
+    next: Annotated[Integers, "moving"]  # another one in the same bucket, −1 = none
     key: Annotated[Integers, "pair"]
     pairs: Annotated[Indices, "pair 2"]  # output
     used: Any  # `iapb.compiled.flag`
@@ -50,7 +49,7 @@ def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
     """Return the broad phase of the candidate pairs (k, 2); without pairs (broad phase off) it is a stub."""
     n = len(shapes.kind) if len(pairs) else 0
     moving, static = (np.flatnonzero(each).astype(np.int32) for each in (shapes.body[:n] >= 0, shapes.body[:n] < 0))
-    lengths = {"shape": n, "moving": len(moving), "bucket": (1 << (2 * len(moving)).bit_length()) + 1,
+    lengths = {"shape": n, "moving": len(moving), "bucket": 1 << (2 * len(moving)).bit_length(),
                "pair": max(1, min(len(pairs), PAIRS_PER_SHAPE * n))}
     arrays = blank(quantities(BroadPhase), lengths)
     for a, b in pairs:
@@ -80,9 +79,26 @@ LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cel
 @kernel(needs="used", otherwise=0)
 def near_pairs(broad, R, p, margin):
     """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do not fit."""
-    fill_buckets(broad, R, p, margin)
-    count = moving_pairs(broad, margin)
-    for i in broad.moving:
+    width, count = broad.cell_size + margin, 0
+    broad.first[:] = -1
+    for m in range(broad.moving.shape[0]):
+        i = broad.moving[m]
+        body = broad.body[i]
+        store(broad.center, i, add(load(p, body), transform(R, body, load(broad.local_center, i))))
+        for axis in range(3):
+            number = math.floor(broad.center[i, axis] / width)  # may be infinite or not a number
+            broad.cell[m, axis] = int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL
+        for neighbour in range(broad.neighbours):
+            x = broad.cell[m, 0] + neighbour % 3 - 1
+            y = broad.cell[m, 1] + neighbour // 3 % 3 - 1
+            z = broad.cell[m, 2] + (neighbour // 9 + 1) % 3 - 1  # the cell's own layer first
+            n = broad.first[bucket_of(broad, x, y, z)]
+            while n >= 0:
+                if broad.cell[n, 0] == x and broad.cell[n, 1] == y and broad.cell[n, 2] == z:
+                    count = keep_pair(broad, i, broad.moving[n], margin, count)
+                n = broad.next[n]
+        bucket = bucket_of(broad, broad.cell[m, 0], broad.cell[m, 1], broad.cell[m, 2])
+        broad.next[m], broad.first[bucket] = broad.first[bucket], m
         for j in broad.static:
             count = keep_pair(broad, i, j, margin, count)
     sort_keys(broad.key, count)
@@ -94,51 +110,9 @@ def near_pairs(broad, R, p, margin):
 
 
 @kernel
-def bucket_of(x, y, z, buckets):
-    """Return the bucket of a cell by a hash with three primes (Teschner et al., 2003); `buckets`: a power of two."""
-    return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (buckets - 1)
-
-
-@kernel
-def fill_buckets(broad, R, p, margin):
-    """Place the bounding spheres of the moving shapes; sort them by the bucket of their cell (counting sort)."""
-    buckets, width = broad.start.shape[0] - 1, broad.cell_size + margin
-    broad.start[:] = 0
-    for m in range(broad.moving.shape[0]):
-        i = broad.moving[m]
-        body = broad.body[i]
-        store(broad.center, i, add(load(p, body), transform(R, body, load(broad.local_center, i))))
-        for axis in range(3):
-            number = math.floor(broad.center[i, axis] / width)  # may be infinite or not a number
-            broad.cell[m, axis] = int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL
-        broad.bucket[m] = bucket_of(broad.cell[m, 0], broad.cell[m, 1], broad.cell[m, 2], buckets)
-        broad.start[broad.bucket[m] + 1] += 1
-    for k in range(buckets):
-        broad.start[k + 1] += broad.start[k]
-    for m in range(broad.moving.shape[0]):
-        broad.sorted[broad.start[broad.bucket[m]]] = m
-        broad.start[broad.bucket[m]] += 1
-    for k in range(buckets, 0, -1):  # filling moved every start to the next one
-        broad.start[k] = broad.start[k - 1]
-    broad.start[0] = 0
-
-
-@kernel
-def moving_pairs(broad, margin):
-    """Append the pairs of moving shapes from the 9 (plane) or 27 cells around each shape, each pair once."""
-    buckets, count = broad.start.shape[0] - 1, 0
-    for m in range(broad.moving.shape[0]):
-        for neighbour in range(broad.neighbours):
-            x = broad.cell[m, 0] + neighbour % 3 - 1
-            y = broad.cell[m, 1] + neighbour // 3 % 3 - 1
-            z = broad.cell[m, 2] + (neighbour // 9 + 1) % 3 - 1  # the cell's own layer first
-            bucket = bucket_of(x, y, z, buckets)
-            for k in range(broad.start[bucket], broad.start[bucket + 1]):
-                n = broad.sorted[k]
-                if n <= m or broad.cell[n, 0] != x or broad.cell[n, 1] != y or broad.cell[n, 2] != z:
-                    continue
-                count = keep_pair(broad, broad.moving[m], broad.moving[n], margin, count)
-    return count
+def bucket_of(broad, x, y, z):
+    """Return the bucket of a cell, of 2ⁿ buckets, by a hash with three primes (Teschner et al., 2003)."""
+    return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (broad.first.shape[0] - 1)
 
 
 @kernel
@@ -159,23 +133,13 @@ def keep_pair(broad, i, j, margin, count):
 
 @kernel
 def sort_keys(keys, count):
-    """Sort the first `count` keys by heapsort: no recursion, no scratch, n log n for every input order."""
-    for root in range(count // 2 - 1, -1, -1):
-        _sift(keys, root, count)
-    for end in range(count - 1, 0, -1):
-        keys[0], keys[end] = keys[end], keys[0]
-        _sift(keys, 0, end)
-
-
-@kernel
-def _sift(keys, root, end):
-    while True:
-        child = 2 * root + 1
-        if child >= end:
-            return
-        if child + 1 < end and keys[child + 1] > keys[child]:
-            child += 1
-        if keys[root] >= keys[child]:
-            return
-        keys[root], keys[child] = keys[child], keys[root]
-        root = child
+    """Sort the first `count` keys by Shell's method: no recursion, no scratch, few steps for every input order."""
+    gap = count
+    while gap > 1:
+        gap = max(1, 4 * gap // 9)
+        for k in range(gap, count):
+            key, at = keys[k], k
+            while at >= gap and keys[at - gap] > key:
+                keys[at] = keys[at - gap]
+                at -= gap
+            keys[at] = key

@@ -14,18 +14,12 @@ from iapb.contact.kernels.contact_set import (
     group_of_contact,
     pair_restitution,
 )
-from iapb.contact.kernels.impact import factored_impact, project_impact, rank_tolerance
+from iapb.contact.kernels.impact import factored_impact, rank_tolerance, whiten_impact
 from iapb.contact.kernels.impact_friction import add_impact_friction
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.passive import passive_step, plainly_loses, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
-from iapb.contact.kernels.rows import (
-    body_row,
-    contact_velocities,
-    direction_row,
-    friction_of,
-    tangent_of,
-)
+from iapb.contact.kernels.rows import body_row, contact_velocities, direction_row, friction_of, tangent_of
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.contact.kernels.unilateral import poisson_impact
 from iapb.linalg import load
@@ -33,25 +27,23 @@ from iapb.run import COLLIDING
 
 
 @kernel
-def gather_dofs(world, state, island):
-    """List the coordinates of an island, which is a contact group (2)-(3) or a part of one; return how many."""
-    size = 0
+def gather_group(world, state, island):
+    """List the coordinates of an island, a contact group (2)-(3) or a part of one; copy v, M and L; return its size.
+
+    M is block diagonal, so its factor is too.
+    """
+    size, dofs, work = 0, state.dofs, state.work
     for t in range(world.tree_start.shape[0]):
         if state.island_of_tree[t] == island:
             for k in range(world.tree_start[t], world.tree_stop[t]):
-                state.dofs[size] = k
+                dofs[size] = k
                 size += 1
-    return size
-
-
-@kernel
-def gather_group(world, state, size):
-    """Copy the group's blocks of M, L and v: M is block diagonal, so its factor is too."""
     for i in range(size):
-        state.group_v[i] = state.v[state.dofs[i]]
+        work.v[i] = state.v[dofs[i]]
         for j in range(size):
-            state.group_mass[i, j] = state.mass_matrix[state.dofs[i], state.dofs[j]]
-            state.group_lower[i, j] = state.lower[state.dofs[i], state.dofs[j]]
+            work.mass[i, j] = state.mass_matrix[dofs[i], dofs[j]]
+            work.lower[i, j] = state.lower[dofs[i], dofs[j]]
+    return size
 
 
 @kernel
@@ -99,20 +91,20 @@ def apply_group(world, state, size, share):
     The applied share is `share` unless rounding of the velocity would gain energy (`iapb.contact.kernels.passive`).
     With Δv = v⁺ − v⁻ and M Δv = Jᵀp the loss is −(v⁻ + Δv/2)·Jᵀp.
     """
-    mass, v, change = state.group_mass[:size, :size], state.group_v[:size], state.work.v_change[:size]
-    after = state.work.shifted[:size]
+    work = state.work
+    v, change, after = work.v[:size], work.v_change[:size], work.shifted[:size]
     for i in range(size):
-        change[i] = state.group_v_plus[i] - v[i]
+        change[i] = work.v_plus[i] - v[i]
     write_step(v, change, share, after)
     certain = share == 1.0  # the velocity that the resolver has accepted
     for i in range(size):
-        certain = certain and after[i] == state.group_v_plus[i]
-    if not certain and not plainly_loses(mass, v, after):
-        share = passive_step(mass, v, change, share, after)
+        certain = certain and after[i] == work.v_plus[i]
+    if not certain and not plainly_loses(work.mass, v, after):
+        share = passive_step(work.mass, v, change, share, after)
     lost = 0.0
     for i in range(size):
         k = state.dofs[i]
-        impulse = share * state.group_impulse[i]
+        impulse = share * work.momentum[i]
         lost -= (v[i] + 0.5 * (share * change[i])) * impulse
         state.v[k] = after[i]
         state.impulse[k] = impulse if state.impulse[k] == 0.0 else state.impulse[k] + impulse
@@ -120,17 +112,14 @@ def apply_group(world, state, size, share):
 
 
 @kernel(needs="unequal_restitution pushing supports", otherwise=(0, 1.0, False))
-def resolve_unequal(world, state, size, count, smallest):
+def resolve_unequal(world, state, size, count, smallest, tolerance):
     """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e, which is passive."""
-    mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
-    v_plus, impulse, work = state.group_v_plus[:size], state.group_impulse[:size], state.work
-    rank, clamp = poisson_impact(mass, lower, v, state.row_restitution, count, True, work, state.push_work,
-                                 state.row_impulse, v_plus, impulse)
-    if rank >= 0:
-        return rank, clamp, True
-    rank, clamp = project_impact(mass, lower, v, smallest, count, rank_tolerance(lower), size, True, work, v_plus,
-                                 impulse)
-    return rank, clamp, False
+    work = state.work
+    rank, clamp = poisson_impact(size, count, state.row_restitution, True, work, state.push_work, state.row_impulse)
+    solved = rank >= 0
+    if not solved:
+        rank, clamp = factored_impact(size, count, smallest, tolerance, size, True, work)
+    return rank, clamp, solved
 
 
 @kernel(needs="impact_friction", otherwise=(1.0, 1.0, True))
@@ -146,16 +135,14 @@ def add_friction_to_impact(world, state, size, count, rank):
             direction_row(world.mechanism, state.body, contacts, i, tangent, state.row)
             for k in range(size):
                 f.rows[r * tangents + a, k] = state.row[state.dofs[k]]
-    return add_impact_friction(
-        state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size], count, rank,
-        state.work, state.push_work, f, state.row_impulse, state.group_v_plus[:size], state.group_impulse[:size])
+    return add_impact_friction(size, count, rank, state.work, state.push_work, f, state.row_impulse)
 
 
 @kernel
 def resolve_rows(world, state, size, count):
     """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of friction, solved)."""
-    mass, lower, v = state.group_mass[:size, :size], state.group_lower[:size, :size], state.group_v[:size]
     work, contacts, e, unequal, solved, friction_share = state.work, state.contacts, world.restitution, False, True, 1.0
+    tolerance = rank_tolerance(work.lower[:size, :size])
     if world.switches.unequal_restitution or world.switches.pushing or world.implicit:
         e, largest, unequal = 1.0, 0.0, world.switches.pushing
         for r in range(count):
@@ -164,16 +151,16 @@ def resolve_rows(world, state, size, count):
             state.row_restitution[r], e, largest = own, min(e, own), max(largest, own)
             unequal = unequal or contacts.mark[i] == HOLDS
         unequal = unequal or e < largest
+    whiten_impact(size, count, work)
     if unequal:
-        rank, clamp, solved = resolve_unequal(world, state, size, count, e)
+        rank, clamp, solved = resolve_unequal(world, state, size, count, e, tolerance)
     else:
         budget = min(size, state.row_budget[0])
-        rank, clamp = factored_impact(mass, lower, v, e, count, rank_tolerance(lower), budget, True, work,
-                                      state.group_v_plus[:size], state.group_impulse[:size])
+        rank, clamp = factored_impact(size, count, e, tolerance, budget, True, work)
     if world.switches.impact_friction:
         span = rank
         if unequal and solved:  # Poisson's law needs no basis of the rows, friction does
-            span = orthonormal_basis(size, count, rank_tolerance(lower), size, work)
+            span = orthonormal_basis(size, count, tolerance, size, work)
         friction_share, factor, met = add_friction_to_impact(world, state, size, count, span)
         clamp, solved = clamp * factor, solved and met
     elif not (unequal and solved):
@@ -184,13 +171,12 @@ def resolve_rows(world, state, size, count):
 @kernel
 def resolve_island(world, state, island):
     """Resolve one simultaneous impact; scale it to the device if the scene has limits; log it."""
-    size, work, log = gather_dofs(world, state, island), state.work, state.impacts
-    gather_group(world, state, size)
+    size, work, log = gather_group(world, state, island), state.work, state.impacts
     count = gather_rows(world, state, island, size)
     rank, clamp, friction_share, solved = resolve_rows(world, state, size, count)
     share, line, approaching = 1.0, log.logged[0], 0
     if world.switches.impulse_limit:
-        share = largest_share(state.group_impulse, state.dofs, size, world.dt, world.impulse_limit)
+        share = largest_share(work.momentum, state.dofs, size, world.dt, world.impulse_limit)
     if world.switches.spreading:
         for t in range(world.tree_start.shape[0]):
             if state.island_of_tree[t] == island:
@@ -215,8 +201,8 @@ def resolve_island(world, state, island):
     copy_into(log.v_plus[line], state.v)
     log.impulse[line] = 0.0
     for i in range(size):
-        log.v_minus[line, state.dofs[i]] = state.group_v[i]
-        log.impulse[line, state.dofs[i]] = applied * state.group_impulse[i]
+        log.v_minus[line, state.dofs[i]] = work.v[i]
+        log.impulse[line, state.dofs[i]] = applied * work.momentum[i]
     log.logged[0] = line + 1
 
 

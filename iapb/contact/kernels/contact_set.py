@@ -30,10 +30,10 @@ def squared_distance(first, i, second, j):
 
 
 @kernel
-def same_surface(first, i, second, j, cosine):
+def same_surface(first, i, second, j):
     """Return whether both contacts have the same two bodies, which come in one order always, and aligned normals."""
     return (first.body_a[i] == second.body_a[j] and first.body_b[i] == second.body_b[j]
-            and dot(load(first.normal, i), load(second.normal, j)) >= cosine)
+            and dot(load(first.normal, i), load(second.normal, j)) >= ALIGNED_COSINE)
 
 
 @kernel(needs="clustering", otherwise=0)
@@ -59,7 +59,7 @@ def cluster(world, contacts, count):
             break
         contacts.mark[deepest] = _KEPT
         for i in range(count):
-            if (contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i, ALIGNED_COSINE)
+            if (contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i)
                     and squared_distance(contacts, deepest, contacts, i) < distance * distance):
                 contacts.mark[i] = _DROPPED
     kept = 0
@@ -72,7 +72,7 @@ def cluster(world, contacts, count):
 
 
 @kernel
-def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED_COSINE):
+def mark_new(contacts, count, previous, previous_count, distance):
     """Write is_new from temporal coherence: by position, or by shapes and feature alone if `distance` is 0.
 
     A contact is old if the step before had a contact (overlap beyond TOUCHING) with the same shapes and feature, or
@@ -91,7 +91,7 @@ def mark_new(contacts, count, previous, previous_count, distance, cosine=ALIGNED
             j = begin + k if begin + k < previous_count else begin + k - previous_count
             if previous.gap[j] < -TOUCHING and (_same_name(contacts, i, previous, j) or (
                     distance > 0.0 and not is_stop(contacts, i) and not is_stop(previous, j)
-                    and same_surface(contacts, i, previous, j, cosine)
+                    and same_surface(contacts, i, previous, j)
                     and squared_distance(contacts, i, previous, j) <= distance * distance)):
                 contacts.is_new[i] = False
                 begin = j + 1 if j + 1 < previous_count else 0
@@ -153,9 +153,9 @@ def classify(world, state, count):
     """Write the groups, the state of each (free, colliding, resting) and the contacts that collide.
 
     Contacts between moving trees link groups. Only contacts with gap <= 0 count. A contact approaches if
-    v_n < −approach_velocity [m/s]. A group collides if one of its *new* contacts approaches, or if any contact
-    approaches while an impulse is still being spread. Then every approaching contact of the group, new or old, enters
-    the impact. `spreading`, trees with an unfinished impulse, is cleared if the group no longer collides.
+    v_n < −approach_velocity [m/s]. With impulses a group collides if one of its *new* contacts approaches, or if any
+    contact approaches while an impulse is still being spread. Then every approaching contact of the group, new or old,
+    enters the impact. `spreading`, trees with an unfinished impulse, is cleared if the group no longer collides.
     """
     contacts, groups, states, spreading = state.contacts, state.group_of_tree, state.state_of_tree, state.spreading
     trees, approaching = groups.shape[0], False
@@ -175,7 +175,7 @@ def classify(world, state, count):
         approaching = approaching or collides
         if contacts.gap[i] > 0.0 or group < 0:
             continue
-        if collides and (contacts.is_new[i] or spreading[group]):
+        if world.switches.impulses and collides and (contacts.is_new[i] or spreading[group]):
             states[group] = COLLIDING
         elif states[group] == FREE:
             states[group] = RESTING

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.passive import UNIT, clamped_step, plainly_loses, write_step
-from iapb.contact.kernels.projector import orthonormal_basis, projected_change
+from iapb.contact.kernels.projector import orthonormal_basis
 from iapb.double_double import add_product, symmetric_entry
 from iapb.linalg import add_multiple, dot_of, from_whitened, to_momentum, to_whitened, whiten_columns
 from iapb.schema import Floats
@@ -20,8 +20,16 @@ _NOISE_FACTOR = 8.0  # rounding of a whitened row is below d · ε · κ(L) in a
 
 
 class ImpactWork(NamedTuple):
-    """Scratch of one impact, with up to as many rows as there are contacts, or two for each."""
+    """One impact, with up to as many rows as there are contacts, or two for each.
 
+    An impact of fewer coordinates than there is room for uses the first d.
+    """
+
+    mass: Annotated[Floats, "velocity velocity"]  # M, symmetric to rounding
+    lower: Annotated[Floats, "velocity velocity"]  # the Cholesky factor of its symmetric part
+    v: Annotated[Floats, "velocity"]  # v⁻
+    v_plus: Annotated[Floats, "velocity"]
+    momentum: Annotated[Floats, "velocity"]  # generalized impulse M(v⁺ − v⁻)
     columns: Annotated[Floats, "velocity row"]  # rows of J as columns, then of A, then their residuals
     rows: Annotated[Floats, "velocity row"]  # unit rows of A as columns, kept for impulses
     length: Annotated[Floats, "row"]  # lengths of the rows of A
@@ -51,11 +59,14 @@ def rank_tolerance(lower):
 
 
 @kernel
-def whiten_impact(lower, v, count, work):
-    """Write unit rows of A (`work.columns`, `work.rows`), their lengths and u, from v and J in `work.columns`."""
-    d, columns, length = v.shape[0], work.columns, work.length
-    to_whitened(lower, v, work.u)
-    whiten_columns(lower, columns, count)
+def whiten_impact(d, count, work):
+    """Prepare an impact from v and `count` rows of J in `work.columns`: write u, unit rows of A, and their lengths.
+
+    The unit rows go to `work.rows` and, in place of those of J, to `work.columns`.
+    """
+    columns, length = work.columns, work.length
+    to_whitened(work.lower, work.v[:d], work.u)
+    whiten_columns(work.lower[:d, :d], columns, count)
     length[:count] = 0.0
     for k in range(d):
         for i in range(count):
@@ -70,44 +81,37 @@ def whiten_impact(lower, v, count, work):
 
 
 @kernel
-def factored_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
-    """Resolve `count` rows, given as columns of `work.columns`, by (21) in factored form.
+def factored_impact(d, count, restitution, tolerance, budget, clamped, work):
+    """Resolve `count` rows, after `whiten_impact`, by (21) in factored form; return (rank, clamp).
 
-    Writes v⁺ and the generalized impulse M(v⁺ − v⁻) = −(1 + e) L Q Qᵀ u; returns (rank, clamp).
+    Writes v⁺ and the generalized impulse M(v⁺ − v⁻) = −(1 + e) L Q Qᵀ u.
     Every row is an equality J v⁺ = −e J v⁻, whatever the sign of its velocity; the caller chooses the rows.
-    A group smaller than the scratch uses only its first d coordinates.
     """
-    whiten_impact(lower, v, count, work)
-    return project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum)
-
-
-@kernel
-def project_impact(mass_matrix, lower, v, restitution, count, tolerance, budget, clamped, work, v_plus, momentum):
-    """Do the part of `factored_impact` that follows `whiten_impact`."""
-    d = v.shape[0]
-    rank = orthonormal_basis(d, count, tolerance, budget, work)
-    projected_change(work.basis, rank, work.u[:d], 1.0 + restitution, work.change[:d])
-    from_whitened(lower, work.change[:d], work.v_change)
+    rank, u, change = orthonormal_basis(d, count, tolerance, budget, work), work.u[:d], work.change[:d]
+    change[:] = 0.0
+    for j in range(rank):
+        add_multiple(change, -((1.0 + restitution) * dot_of(work.basis[j], u)), work.basis[j])
+    from_whitened(work.lower, change, work.v_change)
     if clamped:
-        refine_change(mass_matrix, lower, d, rank, work)
-    return rank, apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum)
+        refine_change(d, rank, work)
+    return rank, apply_change(d, clamped, work)
 
 
 @kernel
-def apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum):
+def apply_change(d, clamped, work):
     """Write v⁺ = v + α Δv and the generalized impulse α L Δu of `work`, where M Δv = L Δu (9); return α.
 
     With the clamp, v⁺ has no more kinetic energy than v in real arithmetic; α = 0 if no other α is found.
     """
-    d, alpha, moved = v.shape[0], 1.0, False
+    v, v_change, v_plus, alpha, moved = work.v[:d], work.v_change[:d], work.v_plus[:d], 1.0, False
     for k in range(d):
-        moved = moved or work.v_change[k] != 0.0
-    write_step(v, work.v_change, alpha, v_plus)
-    if clamped and moved and not plainly_loses(mass_matrix, v, v_plus):
-        alpha = clamped_step(mass_matrix, v, work.v_change[:d], v_plus, work.deviation, work.along, work.shifted)
+        moved = moved or v_change[k] != 0.0
+    write_step(v, v_change, alpha, v_plus)
+    if clamped and moved and not plainly_loses(work.mass, v, v_plus):
+        alpha = clamped_step(work.mass, v, v_change, v_plus, work.deviation, work.along, work.shifted)
     for k in range(d):
         work.change[k] *= alpha
-    to_momentum(lower, work.change[:d], momentum)
+    to_momentum(work.lower, work.change[:d], work.momentum)
     return alpha
 
 
@@ -120,7 +124,7 @@ _PASSES = 3  # each multiplies the remaining error by |E|, about d ε κ(M): 1e-
 
 
 @kernel
-def refine_change(mass_matrix, lower, d, rank, work):
+def refine_change(d, rank, work):
     """Correct Δu = work.change of (21), in the span of the basis, and Δv = work.v_change for M instead of L Lᵀ.
 
     In whitened coordinates M is I + E with |E| about d ε κ(M). The corrected Δu has the given part in the row space
@@ -131,12 +135,12 @@ def refine_change(mass_matrix, lower, d, rank, work):
     change, deviation, inside, shifted = work.change[:d], work.deviation[:d], work.along[:d], work.shifted[:d]
     for k in range(d):
         shifted[k], inside[k] = change[k], 0.0
-    size = dot_of(change, change)
+    size, lower = dot_of(change, change), work.lower
     for _ in range(_PASSES):
         for i in range(d):
             high = low = 0.0
             for j in range(d):
-                entry, rest = symmetric_entry(mass_matrix, i, j)
+                entry, rest = symmetric_entry(work.mass, i, j)
                 high, low = add_product(high, low, entry, rest, work.v_change[j])
             total = high + low
             for j in range(i):

@@ -55,16 +55,15 @@ class FrictionWork(NamedTuple):
 
 
 @kernel
-def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impulses, v_plus, momentum):
+def add_impact_friction(d, count, rank, work, push, f, impulses):
     """Add Coulomb friction to the normal impact in `work`; `f.rows` holds the tangents' rows of J, `f.coefficient` μ.
 
     Writes v⁺, the generalized impulse, the normal impulses (count,) and the tangential ones, `f.p`; returns (share of
     friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, also before convergence. The share is α
     times a factor that keeps p_t within the friction cones if no p_t obeys Coulomb's law.
     """
-    d, p = v.shape[0], f.p[: count * f.velocity.shape[0]]
-    u, change, moved = work.u[:d], work.change[:d], f.moved[:d]
-    scale = split_tangents(lower, count, rank, work, f, d)
+    p, u, change, moved = f.p[: count * f.velocity.shape[0]], work.u[:d], work.change[:d], f.moved[:d]
+    scale = split_tangents(count, rank, work, f, d)
     met = settle_friction(count, rank, work, push, f, d, scale)
     share = share_within_cone(count, f)
     combine(count, f)
@@ -73,8 +72,8 @@ def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impul
     alpha = passive_share(u, change, moved)
     share *= alpha
     add_multiple(change, alpha, moved)
-    from_whitened(lower, change, work.v_change)
-    clamp = apply_change(mass_matrix, lower, v, True, work, v_plus, momentum)
+    from_whitened(work.lower, change, work.v_change)
+    clamp = apply_change(d, True, work)
     for i in range(count):
         impulses[i] = clamp * (f.without[i] + share * (f.wanted[i] - f.without[i]))
     for j in range(p.shape[0]):
@@ -83,12 +82,12 @@ def add_impact_friction(mass_matrix, lower, v, count, rank, work, push, f, impul
 
 
 @kernel
-def split_tangents(lower, count, rank, work, f, d):
+def split_tangents(count, rank, work, f, d):
     """Whiten the tangents' rows, write the slip, and remove the span of the normal rows: write B and A_t Qᵀ.
 
     Returns the largest |A_t,j| |u| [m/s], the scale of the rounding of a tangential velocity.
     """
-    u, largest = work.u[:d], 0.0
+    lower, u, largest = work.lower, work.u[:d], 0.0
     for j in range(count * f.velocity.shape[0]):
         row, slip = f.rows[j, :d], 0.0
         for k in range(d):  # L x = row

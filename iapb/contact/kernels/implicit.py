@@ -243,8 +243,8 @@ def add_square(work, matrix, r, one, other, factor):
 
 @kernel
 def newton_matrix(world, state, size, count, s, k):
-    """Write M + Jᵀ (∂p/∂γ) J to the lower triangle of group_lower, within the envelope."""
-    work, matrix = state.rest_work, state.group_lower
+    """Write M + Jᵀ (∂p/∂γ) J to the lower triangle of `work.lower`, within the envelope."""
+    work, matrix = state.rest_work, state.work.lower
     for i in range(size):
         dof, begin = work.dof[i], work.begin[i]
         for j in range(work.envelope[i], begin):
@@ -310,11 +310,11 @@ def solve(world, state, size, count, s, k):
         if worst <= EXACT:
             return True
         newton_matrix(world, state, size, count, s, k)
-        if not factor_envelope(state.group_lower, work.envelope, size):
+        if not factor_envelope(state.work.lower, work.envelope, size):
             return worst <= GOOD
         for i in range(size):
             step[i] = -work.balance[i]
-        solve_envelope(state.group_lower, work.envelope, size, step)
+        solve_envelope(state.work.lower, work.envelope, size, step)
         along_rows(work, count, s, step, work.change)
         if is_quadratic(world, state, count, s, k):  # the step is exact
             add_multiple(v, 1.0, step)

@@ -72,9 +72,8 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
     frame = placement(shapes.body[a], R, p)
     mx, my = frame[0] * nx + frame[2] * ny, frame[1] * nx + frame[3] * ny  # the normal in a's frame
     offset = (frame[4] - x0) * nx + (frame[5] - y0) * ny - radius
-    vertices, first = shapes.vertices, shapes.first[a]
     for i in range(shapes.count[a]):
-        x, y = vertices[first + i, 0], vertices[first + i, 1]
+        x, y = corner(shapes, a, i)
         gap = mx * x + my * y + offset
         if gap <= margin:
             depth = radius + 0.5 * gap  # from the vertex (or centre) back to midway between the surfaces

@@ -93,14 +93,6 @@ def orthonormal_basis(d, count, tolerance, budget, work):
 
 
 @kernel
-def projected_change(basis, rank, u, factor, change):
-    """Write Δu = −factor · Q Qᵀ u, with factor = 1 + e (21)."""
-    change[:] = 0.0
-    for j in range(rank):
-        add_multiple(change, -(factor * dot_of(basis[j], u)), basis[j])
-
-
-@kernel
 def minimum_norm_impulses(d, count, rank, length, change, impulses, work):
     """Write the p of least Euclidean norm with Aᵀ p = Δu, for Δu in the span of the basis.
 

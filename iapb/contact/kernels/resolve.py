@@ -13,13 +13,13 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance
+from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance, whiten_impact
 from iapb.contact.kernels.impact_friction import FrictionWork, add_impact_friction
 from iapb.contact.kernels.passive import gain_enclosure, passive_step
 from iapb.contact.kernels.projector import minimum_norm_impulses
 from iapb.contact.kernels.unilateral import PushWork, poisson_impact
 from iapb.double_double import kinetic_energies
-from iapb.linalg import add_multiple, cholesky, dot_of
+from iapb.linalg import add_multiple, all_finite, cholesky, dot_of
 from iapb.schema import Floats, Integers
 
 # |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as given, in which the skew
@@ -49,15 +49,11 @@ class Results(NamedTuple):
 class ResolveWork(NamedTuple):
     """Scratch of one whole impact."""
 
-    mass: Annotated[Floats, "velocity velocity"]  # scaled, symmetric to rounding
-    lower: Annotated[Floats, "velocity velocity"]  # the Cholesky factor of its symmetric part
-    velocity: Annotated[Floats, "velocity"]  # scaled
-    v_plus: Annotated[Floats, "velocity"]  # scaled
     coordinate_exponent: Annotated[Integers, "velocity"]  # s
     row_exponent: Annotated[Integers, "row"]  # r
     size: Annotated[Floats, "row"]  # ratio of the caller's rows to the scaled rows, up to one common factor
     length: Annotated[Floats, "row"]
-    impact: ImpactWork
+    impact: ImpactWork  # scaled
     push: PushWork
     friction: FrictionWork
 
@@ -72,25 +68,24 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
     tolerance : rank tolerance of the rows; 0 selects the default.  out : `Results`
     """
     n, c, d = jacobians.shape
-    lower, impact, f = work.lower, work.impact, work.friction
+    impact, f = work.impact, work.friction
     for m in range(n):
         v_plus, momentum, p, p_t = out.velocity[m], out.generalized_impulse[m], out.impulses[m], out.tangential[m]
         out.numbers[m, 1] = REFUSED
         sound, k, rounded = scale_impact(masses[m], jacobians[m], velocities[m], tangents is None, work)
         if not sound:
             return m
+        whiten_impact(d, c, impact)
         share, status = 1.0, COMPLETE
         if unequal is not None:
-            rank, clamp = poisson_impact(work.mass, lower, work.velocity, unequal[m], c, clamped, impact, work.push, p,
-                                         work.v_plus, momentum)
+            rank, clamp = poisson_impact(d, c, unequal[m], clamped, impact, work.push, p)
             if rank < 0:
                 out.numbers[m, 1] = NOT_CONVERGED
                 return m
             status = COMPLETE if clamp >= 1.0 - _UNSOLVED and separates(d, c, impact) else NOT_SOLVED
         else:
-            least = tolerance if tolerance > 0.0 else rank_tolerance(lower)
-            rank, clamp = factored_impact(work.mass, lower, work.velocity, restitution[m], c, least, budget, clamped,
-                                          impact, work.v_plus, momentum)
+            least = tolerance if tolerance > 0.0 else rank_tolerance(impact.lower)
+            rank, clamp = factored_impact(d, c, restitution[m], least, budget, clamped, impact)
             for i in range(c if rank == budget and rank < d else 0):
                 status = BUDGET if impact.size[i] > least * least else status
             if tangents is None:
@@ -100,13 +95,13 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
                     for i in range(d):
                         f.rows[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
                 copy_into(f.coefficient[:c], friction[m])
-                share, factor, met = add_impact_friction(work.mass, lower, work.velocity, c, rank, impact, work.push,
-                                                         f, p, work.v_plus, momentum)
+                share, factor, met = add_impact_friction(d, c, rank, impact, work.push, f, p)
                 clamp *= factor
                 status = COMPLETE if met else REDUCED
                 copy_into(p_t, f.p)
         clamp *= unscale_impact(masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.numbers[m])
-        if not (finite(v_plus) and finite(momentum) and finite(p) and finite(p_t) and math.isfinite(out.numbers[m, 2])):
+        if not (all_finite(v_plus) and all_finite(momentum) and all_finite(p) and all_finite(p_t)
+                and math.isfinite(out.numbers[m, 2])):
             return m
         out.numbers[m, 0], out.numbers[m, 1] = rank, CANCELLED if clamp == 0.0 or rounded and c > 0 else status
         out.numbers[m, 5], out.numbers[m, 6] = clamp, share
@@ -119,21 +114,21 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
 
     Returns whether all is finite and M symmetric and positive definite, k, and whether scaling rounded entries of v.
     """
-    d, s, r = velocity.shape[0], work.coordinate_exponent, work.row_exponent
+    d, s, r, impact = velocity.shape[0], work.coordinate_exponent, work.row_exponent, work.impact
     for i in range(d):
         if not (mass_matrix[i, i] > 0.0 and math.isfinite(mass_matrix[i, i]) and math.isfinite(velocity[i])):
             return False, 0, False
         s[i] = -(math.frexp(mass_matrix[i, i])[1] // 2)
     for i in range(d):
         for j in range(d):
-            work.mass[i, j] = np.ldexp(mass_matrix[i, j], s[i] + s[j])
+            impact.mass[i, j] = np.ldexp(mass_matrix[i, j], s[i] + s[j])
     for i in range(d):
         for j in range(d):
-            a, b = work.mass[i, j], work.mass[j, i]
+            a, b = impact.mass[i, j], impact.mass[j, i]
             if not (abs(a) <= LARGEST_ENTRY and abs(a - b) <= SYMMETRY_TOLERANCE):
                 return False, 0, False
-            work.lower[i, j] = a if a == b else 0.5 * (a + b)
-    if cholesky(work.lower, work.lower) != 0:
+            impact.lower[i, j] = a if a == b else 0.5 * (a + b)
+    if cholesky(impact.lower, impact.lower) != 0:
         return False, 0, False
     k, rounded = _LOWEST_EXPONENT, False
     for i in range(d):
@@ -141,7 +136,7 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
     k = 0 if k <= _LOWEST_EXPONENT // 2 else k
     for i in range(d):
         rounded = rounded or _LOWEST_EXPONENT // 2 < _exponent(velocity[i]) - s[i] < k - _EXACT
-        work.velocity[i] = np.ldexp(velocity[i], -(s[i] + k))
+        impact.v[i] = np.ldexp(velocity[i], -(s[i] + k))
     for i in range(jacobian.shape[0]):
         r[i] = -_LOWEST_EXPONENT if scales_rows else 0  # the first is that of a row of zeros
         for j in range(d):
@@ -150,7 +145,7 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
             if scales_rows:
                 r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
         for j in range(d):
-            work.impact.columns[j, i] = np.ldexp(jacobian[i, j], r[i] + s[j])
+            impact.columns[j, i] = np.ldexp(jacobian[i, j], r[i] + s[j])
     return True, k, rounded
 
 
@@ -207,29 +202,29 @@ def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, im
 
     Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of this clamp.
     """
-    d, s, factor = velocity.shape[0], work.coordinate_exponent, 1.0
+    d, s, factor, impact = velocity.shape[0], work.coordinate_exponent, 1.0, work.impact
     for i in range(d):
-        v_plus[i] = np.ldexp(work.v_plus[i], s[i] + k)
-        momentum[i] = np.ldexp(momentum[i], k - s[i])
+        v_plus[i] = np.ldexp(impact.v_plus[i], s[i] + k)
+        momentum[i] = np.ldexp(impact.momentum[i], k - s[i])
     for i in range(impulses.shape[0]):
         impulses[i] = np.ldexp(impulses[i], work.row_exponent[i] + k)
     for j in range(tangential.shape[0]):
         tangential[j] = np.ldexp(tangential[j], k)
-    if not finite(v_plus):
+    if not all_finite(v_plus):
         return factor
     lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
     if clamped and not upper <= 0.0:
-        step = work.impact.v_change
+        step = impact.v_change
         for i in range(d):
             step[i] = v_plus[i] - velocity[i]
         factor = passive_step(mass_matrix, velocity, step[:d], 1.0, v_plus)
         for i in range(d):
-            work.v_plus[i] = np.ldexp(v_plus[i], -(s[i] + k))
+            impact.v_plus[i] = np.ldexp(v_plus[i], -(s[i] + k))
         for scaled in (momentum, impulses, tangential):
             for i in range(scaled.shape[0]):
                 scaled[i] *= factor
         lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
-    change = np.ldexp(kinetic_energies(work.mass, work.velocity, work.v_plus)[1], 2 * k)
+    change = np.ldexp(kinetic_energies(impact.mass, impact.v, impact.v_plus)[1], 2 * k)
     low, high = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
     change = low if low > change else change
     numbers[2], numbers[3], numbers[4] = high if high < change else change, low, high
@@ -243,12 +238,3 @@ def _outward(value, exponent, towards):
     if towards > 0.0:
         return min(bound, 0.0) if value <= 0.0 else bound
     return max(bound, 0.0) if value >= 0.0 else bound
-
-
-@kernel
-def finite(vector):
-    """Whether all entries are finite."""
-    sound = True
-    for k in range(vector.shape[0]):
-        sound = sound and math.isfinite(vector[k])
-    return sound

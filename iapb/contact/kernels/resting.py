@@ -45,17 +45,12 @@ def resting_force(world, state, contacts, i):
     add_body_row(world.mechanism, state.body, contacts.body_a[i], x, n, force, state.stage_penalty)
     add_body_row(world.mechanism, state.body, contacts.body_b[i], x, n, -force, state.stage_penalty)
     friction = 0.0 if world.coulomb else friction_of(world, contacts, i)
-    if friction != 0.0:
-        add_friction(world, state, contacts, i, friction)
-
-
-@kernel
-def add_friction(world, state, contacts, i, friction):
-    """Add Jᵀ F_f to the friction of the stage: (6) at contact i, opposed to the tangential velocity."""
-    x, tangential = load(contacts.point, i), load(contacts.tangential_velocity, i)
+    if friction == 0.0:
+        return
+    tangential = load(contacts.tangential_velocity, i)
     speed = math.sqrt(dot(tangential, tangential))
-    share = friction_share(contacts.normal_force[i], speed, friction, world.friction_velocity)
-    force = scale(share, tangential)
-    store(contacts.friction_force, i, force)
-    add_point_force(world.mechanism, state.body, contacts.body_a[i], x, force, state.stage_friction)
-    add_point_force(world.mechanism, state.body, contacts.body_b[i], x, scale(-1.0, force), state.stage_friction)
+    friction_force = scale(friction_share(force, speed, friction, world.friction_velocity), tangential)
+    store(contacts.friction_force, i, friction_force)
+    add_point_force(world.mechanism, state.body, contacts.body_a[i], x, friction_force, state.stage_friction)
+    opposite = scale(-1.0, friction_force)
+    add_point_force(world.mechanism, state.body, contacts.body_b[i], x, opposite, state.stage_friction)

@@ -212,7 +212,6 @@ def _edges(shapes, a, b, i, j, gap, A, B, buffer, count):
 
 # Face against face of two boxes: the corners of their overlap as contacts. In the frame of the reference face (x, y
 # along its sides, h the height over it) the incident face is c + α e1 + β e2 with α, β in [-1, 1].
-MOST_POINTS = BOX_PAIR_CONTACTS  # the corners of a large quadrilateral carry any load between them
 ALIGNED = 1e-9  # of the faces' sizes: points closer than this are one corner; far above rounding, far below any sag
 
 
@@ -249,7 +248,7 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, m
             point = add(add(origin, scale(0.5 * h, m)), add(scale(x, u), scale(y, v)))
             count = store_contact(shapes, other, ref, not ref_is_a, vertex_feature(kind, faces, number), point, m, h,
                                   buffer, count)
-    return keep_widest(buffer, start, count, m) if count - start > MOST_POINTS else count
+    return keep_widest(buffer, start, count, m) if count - start > BOX_PAIR_CONTACTS else count
 
 
 @kernel
@@ -319,7 +318,7 @@ def keep_widest(buffer, start, count, m):
             if reach > best:
                 chosen, best = i, reach
         _swap(buffer, rank, chosen, count)
-    return start + MOST_POINTS
+    return start + BOX_PAIR_CONTACTS
 
 
 @kernel

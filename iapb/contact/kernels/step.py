@@ -44,7 +44,7 @@ from iapb.mechanics.kernels.free_motion import (
     to_fixed_axes,
 )
 from iapb.mechanics.kernels.kinematics import forward_kinematics
-from iapb.run import COLLIDING, FREE, RESTING
+from iapb.run import COLLIDING, FREE
 
 # Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may overflow: the motion has
 # diverged. (Scenes hold numbers up to 1e9.)
@@ -123,9 +123,6 @@ def find_contacts(world, state):
     contact_velocities(world.mechanism, state.body, state.v, now, count)
     mark_new(now, count, before, state.contact_count[1], world.coherence_distance)
     classify(world, state, count)
-    for t in range(0 if world.switches.impulses else state.state_of_tree.shape[0]):
-        if state.state_of_tree[t] == COLLIDING:
-            state.state_of_tree[t] = RESTING
     return count
 
 
@@ -245,25 +242,23 @@ def swing(world, state, h):
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
             start, stop = world.tree_start[t], world.tree_stop[t]
-            p = state.root_momentum[9 * t : 9 * t + 9]
+            p = state.root_momentum[t]
             state.tree_energy[t] = base_momentum(m, free, state.body, state.q, state.mass_matrix, start, stop, t,
                                                  state.v, p)
             center, mass = center_of(m, state.body, world.tree_of_body, t)
             path = scale(h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, t, p))
             p[6], p[7], p[8] = add(center, path)
-            add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
     for b in range(m.kind.shape[0]):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
+            start, stop = m.v_start[b], m.v_start[b] + m.v_count[b]
+            add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
             integrate_body(m, b, state.q, state.v, h, state.q)
-    for t in range(free.kind.shape[0]):
-        if free.kind[t] == LINKAGE:
-            for k in range(world.tree_start[t], world.tree_stop[t]):
-                state.v[k] += 0.5 * h * a[k]
+            add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
     if not locate(world, state):
         return False
     for t in range(free.kind.shape[0]):
         if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
-            p = state.root_momentum[9 * t : 9 * t + 9]
+            p = state.root_momentum[t]
             center, _ = center_of(m, state.body, world.tree_of_body, t)
             shift_root(m, free, state.body, world.tree_of_body, state.q, t, subtract((p[6], p[7], p[8]), center))
     copy_into(state.located_q, state.q)
@@ -275,7 +270,7 @@ def swing(world, state, h):
             start, stop = world.tree_start[t], world.tree_stop[t]
             for k in range(start, stop):
                 state.v[k] += 0.5 * h * (a[k] - state.mean_acceleration[k])
-            p = state.root_momentum[9 * t : 9 * t + 9]
+            p = state.root_momentum[t]
             to_fixed_axes(m, free, state.body, state.q, t, p, -1.0)
             keep_momentum_and_energy(state.mass_matrix, state.lower, start, stop, free.base[t], p,
                                      state.tree_energy[t], state.v, state.bias)
@@ -313,7 +308,7 @@ def damp_joints(world, state):
     passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M. These trees move with the new velocity under
     every integrator.
     """
-    a = state.acceleration
+    a, mass, lower = state.acceleration, state.work.mass, state.work.lower
     for t in range(world.tree_start.shape[0]):
         start, stop, damped = world.tree_start[t], world.tree_stop[t], False
         for k in range(start, stop):
@@ -323,12 +318,12 @@ def damp_joints(world, state):
             continue
         for i in range(start, stop):
             for j in range(start, stop):
-                state.group_mass[i, j] = state.mass_matrix[i, j]
+                mass[i, j] = state.mass_matrix[i, j]
                 a[i] += state.mass_matrix[i, j] * state.v[j]
-            state.group_mass[i, i] += world.dt * world.joint_damping[i]
-        if cholesky(state.group_mass[start:stop, start:stop], state.group_lower[start:stop, start:stop]) != 0:
+            mass[i, i] += world.dt * world.joint_damping[i]
+        if cholesky(mass[start:stop, start:stop], lower[start:stop, start:stop]) != 0:
             return False
-        solve_mass(state.group_lower[start:stop, start:stop], a[start:stop], a[start:stop])
+        solve_mass(lower[start:stop, start:stop], a[start:stop], a[start:stop])
         for k in range(start, stop):
             state.v[k] = state.mean_v[k] = a[k]
             a[k] *= -world.joint_damping[k]
@@ -337,9 +332,25 @@ def damp_joints(world, state):
 
 @kernel
 def accelerate(world, state, applied, stage):
-    """Solve (7), M a = applied + penalty + friction − B − G, at the present stage."""
-    rest(world, state, stage)
-    a = state.acceleration
+    """Solve (7), M a = applied + penalty + friction − B − G, at the present stage.
+
+    The forces (4)-(6) act at the contacts of groups that do not collide; in a collision the impulse acts.
+    """
+    a, contacts, count = state.acceleration, state.contacts, 0
+    for k in range(a.shape[0]):
+        state.stage_penalty[k] = state.stage_friction[k] = 0.0
+    if world.switches.contacts and not world.implicit:
+        count = state.contact_count[0]
+        if stage > 0:
+            contacts = state.stage_contacts
+            count = present_contacts(world, state, contacts)
+            contact_velocities(world.mechanism, state.body, state.v, contacts, count)
+    for i in range(count):
+        contacts.normal_force[i] = 0.0
+        store(contacts.friction_force, i, (0.0, 0.0, 0.0))
+        group = group_of_contact(world, contacts, i, state.group_of_tree)
+        if group >= 0 and state.state_of_tree[group] != COLLIDING:
+            resting_force(world, state, contacts, i)
     for k in range(a.shape[0]):
         a[k] = applied[k] + state.stage_penalty[k] + state.stage_friction[k]
     if world.switches.gravity:
@@ -351,23 +362,3 @@ def accelerate(world, state, applied, stage):
         bias(world.mechanism, state.body, state.v, state.bias)
         add_multiple(a, -1.0, state.bias)
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, a, a)
-
-
-@kernel
-def rest(world, state, stage):
-    """Write the forces (4)-(6) at the contacts of groups that do not collide; in a collision the impulse acts."""
-    for k in range(state.v.shape[0]):
-        state.stage_penalty[k] = state.stage_friction[k] = 0.0
-    if not world.switches.contacts or world.implicit:
-        return
-    contacts, count = state.contacts, state.contact_count[0]
-    if stage > 0:
-        contacts = state.stage_contacts
-        count = present_contacts(world, state, contacts)
-        contact_velocities(world.mechanism, state.body, state.v, contacts, count)
-    for i in range(count):
-        contacts.normal_force[i] = 0.0
-        store(contacts.friction_force, i, (0.0, 0.0, 0.0))
-        group = group_of_contact(world, contacts, i, state.group_of_tree)
-        if group >= 0 and state.state_of_tree[group] != COLLIDING:
-            resting_force(world, state, contacts, i)

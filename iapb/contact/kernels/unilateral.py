@@ -10,7 +10,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.impact import apply_change, whiten_impact
+from iapb.contact.kernels.impact import apply_change
 from iapb.linalg import dot_of, from_whitened, orthogonalize
 from iapb.schema import Booleans, Floats, Integers
 
@@ -19,16 +19,14 @@ _CLOSING = 1e-13
 
 
 class PushWork(NamedTuple):
-    """Scratch of impulses that only push; `passive` is the number of velocities and one more."""
+    """Scratch of impulses that only push."""
 
-    q: Annotated[Floats, "passive velocity"]  # orthonormal directions of the passive rows
-    triangle: Annotated[Floats, "passive passive"]
-    solution: Annotated[Floats, "passive"]
-    passive: Annotated[Integers, "passive"]  # rows that push
+    q: Annotated[Floats, "velocity velocity"]  # orthonormal directions of the passive rows
+    triangle: Annotated[Floats, "velocity velocity"]
+    solution: Annotated[Floats, "velocity"]
+    passive: Annotated[Integers, "velocity"]  # rows that push
     held: Annotated[Booleans, "row"]  # the row is passive
     banned: Annotated[Booleans, "row"]  # the row depends on the passive rows to rounding
-    compressed: Annotated[Floats, "velocity"]  # whitened velocity after compression
-    final: Annotated[Floats, "velocity"]  # after restitution
     more: Annotated[Floats, "row"]  # impulses of the restitution phase beyond E p_c
 
 
@@ -53,8 +51,8 @@ def push_only(rows, count, b, p, residual, work):
                     entering, speed = i, closing
         if entering < 0 or speed >= -threshold:
             return True
-        work.passive[size] = entering
         if size < d:
+            work.passive[size] = entering
             known = _solve_passive(rows, b, known, size + 1, work)
         if known <= size:
             work.banned[entering] = True  # dependent on the passive rows: it cannot close alone
@@ -116,17 +114,16 @@ def _retreat(rows, b, size, p, work):
 
 
 @kernel
-def poisson_impact(mass_matrix, lower, v, restitution, count, clamped, work, push, impulses, v_plus, momentum):
-    """Resolve `count` rows, columns of `work.columns`, by Poisson's law with e in [0, 1] for each, by two LCPs.
+def poisson_impact(d, count, restitution, clamped, work, push, impulses):
+    """Resolve `count` rows, after `whiten_impact`, by Poisson's law with e in [0, 1] for each, by two LCPs.
 
     Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
     p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
     Writes v⁺, the generalized impulse M(v⁺ − v⁻) and the impulses along the rows; returns (number of rows that
     push, clamp). If the active-set method does not converge, it returns (−1, 1) and v⁺ is not written.
     """
-    d, rows = v.shape[0], work.rows
-    u, compressed, final = work.u[:d], push.compressed[:d], push.final[:d]
-    whiten_impact(lower, v, count, work)
+    rows, u = work.rows, work.u[:d]
+    compressed, final = work.target[:d], work.along[:d]  # whitened velocities after compression and after restitution
     if not push_only(rows, count, u, impulses, compressed, push):
         return -1, 1.0
     for i in range(count):
@@ -138,8 +135,8 @@ def poisson_impact(mass_matrix, lower, v, restitution, count, clamped, work, pus
         return -1, 1.0
     for k in range(d):
         work.change[k] = final[k] - u[k]
-    from_whitened(lower, work.change[:d], work.v_change)
-    clamp, pushing = apply_change(mass_matrix, lower, v, clamped, work, v_plus, momentum), 0
+    from_whitened(work.lower, work.change[:d], work.v_change)
+    clamp, pushing = apply_change(d, clamped, work), 0
     for i in range(count):
         impulses[i] += push.more[i]
         pushing += impulses[i] > 0.0

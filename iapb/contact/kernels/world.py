@@ -124,19 +124,14 @@ class State(NamedTuple):
     contact_impulse: Annotated[Floats, "row"]  # [N s] per contact, minimum norm
     rows: Annotated[Integers, "row"]  # contact of each row of the present impact
     dofs: Annotated[Integers, "velocity"]  # coordinates of the present group
-    group_mass: Annotated[Floats, "velocity velocity"]
-    group_lower: Annotated[Floats, "velocity velocity"]
-    group_v: Annotated[Floats, "velocity"]
-    group_v_plus: Annotated[Floats, "velocity"]
-    group_impulse: Annotated[Floats, "velocity"]
     row_impulse: Annotated[Floats, "row"]
     row_restitution: Annotated[Floats, "row"]
     row: Annotated[Floats, "velocity"]  # one contact row nᵀJ
-    work: ImpactWork
+    work: ImpactWork  # of the present group
     push_work: PushWork
     friction_work: FrictionWork
     rest_work: RestWork
     located_q: Annotated[Floats, "coordinate"]  # configuration of mass_matrix and lower; NaN: any
-    root_momentum: Annotated[Floats, "root"]  # scratch of free motion: a root's momentum and its centre
+    root_momentum: Annotated[Floats, "tree 9"]  # scratch of free motion: a root's momentum and its centre
     tree_energy: Annotated[Floats, "tree"]  # of a tree, in free motion
     impacts: Any  # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the step

@@ -49,13 +49,6 @@ class Workspace(NamedTuple):
     placed_q: Annotated[Floats, "placed"]  # first nq: the q of the first four fields; NaN: not computed yet
 
 
-class Evaluation(NamedTuple):
-    """A mechanism with its scratch, passed as one argument: each argument adds 0.1 µs to a call from Python."""
-
-    mechanism: MechanismArrays
-    workspace: Workspace
-
-
 def make_workspace(bodies: int, dofs: int) -> Workspace:
     """Return scratch for a mechanism with that many bodies and dofs (joints have at most two entries of q per dof)."""
     made = zeros_of(Workspace, body=bodies, dof=dofs, placed=2 * dofs)

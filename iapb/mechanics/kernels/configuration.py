@@ -110,9 +110,19 @@ def quaternion_difference(q0, q1, i):
     return scale(factor, vector)
 
 
-@kernel
-def inverse_screw(path, phi):
-    """Return u with (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi x (phi x path)."""
+@kernel(needs="quaternions")
+def difference_in_space(m, b, q0, q1, out):
+    """Write the velocity of body b, which has a quaternion, from q0 to q1.
+
+    A free flyer's u solves (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi x (phi x path).
+    """
+    i, k = m.q_start[b], m.v_start[b]
+    if m.kind[b] == SPHERICAL:
+        out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
+        return
+    phi = quaternion_difference(q0, q1, i + 3)
+    path = (q1[i] - q0[i], q1[i + 1] - q0[i + 1], q1[i + 2] - q0[i + 2])
+    path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
     angle = sqrt(dot(phi, phi))
     square = angle * angle
     if angle < SMALL_ANGLE:
@@ -121,20 +131,8 @@ def inverse_screw(path, phi):
         sin, cos = sine_cosine(0.5 * angle)
         factor = (1.0 - 0.5 * angle * cos / sin) / square
     turned = cross(phi, path)
-    return add(path, add(scale(-0.5, turned), scale(factor, cross(phi, turned))))
-
-
-@kernel(needs="quaternions")
-def difference_in_space(m, b, q0, q1, out):
-    """Write the velocity of body b, which has a quaternion, from q0 to q1."""
-    i, k = m.q_start[b], m.v_start[b]
-    if m.kind[b] == SPHERICAL:
-        out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
-        return
-    phi = quaternion_difference(q0, q1, i + 3)
-    path = (q1[i] - q0[i], q1[i + 1] - q0[i + 1], q1[i + 2] - q0[i + 2])
-    path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
-    out[k], out[k + 1], out[k + 2] = inverse_screw(path, phi)
+    path = add(path, add(scale(-0.5, turned), scale(factor, cross(phi, turned))))
+    out[k], out[k + 1], out[k + 2] = path
     out[k + 3], out[k + 4], out[k + 5] = phi
 
 

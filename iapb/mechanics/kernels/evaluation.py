@@ -3,11 +3,11 @@
 Some of them check configurations, which come from the user; no other kernel checks its input.
 """
 
-from math import isfinite, sqrt
+from math import sqrt
 
 from iapb.compiled import kernel
 from iapb.elementary import arc_tangent
-from iapb.linalg import add, cholesky, cross, dot, load, scale, solve_mass, subtract
+from iapb.linalg import add, all_finite, cholesky, cross, dot, load, scale, solve_mass, subtract
 from iapb.mechanics.joints import FREE_FLYER
 from iapb.mechanics.kernels.configuration import difference, is_vector, turn_vector
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
@@ -15,15 +15,6 @@ from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematic
 
 # Tolerance on the length of a given quaternion or (cos, sin) pair: single precision input passes.
 UNIT_TOLERANCE = 1e-6
-
-
-@kernel
-def all_finite(values):
-    """Return whether a vector has no NaN and no infinity."""
-    for k in range(values.shape[0]):  # noqa: SIM110 - a kernel has no generators
-        if not isfinite(values[k]):
-            return False
-    return True
 
 
 @kernel
@@ -41,31 +32,24 @@ def misplaced_body(m, q):
 
 
 @kernel
-def mass_matrices_at(at, q, out):
-    """out (n d, d) <- M at each of n configurations, q (n nq,); return False at the first that is not valid."""
-    d = out.shape[1]
-    n = out.shape[0] // max(d, 1)
-    for k in range(n):
-        place = q[k * q.shape[0] // n : (k + 1) * q.shape[0] // n]
-        if misplaced_body(at.mechanism, place) >= 0:
+def mass_matrices_at(m, w, q, out):
+    """out (n, d, d) <- M at each of n configurations q (n, nq); return False at the first that is not valid."""
+    for k in range(q.shape[0]):
+        if misplaced_body(m, q[k]) >= 0:
             return False
-        forward_kinematics(at.mechanism, place, at.workspace)
-        mass_matrix(at.mechanism, at.workspace, out[k * d : (k + 1) * d])
+        forward_kinematics(m, q[k], w)
+        mass_matrix(m, w, out[k])
     return True
 
 
 @kernel
-def biases_at(at, q, v, out):
-    """out (n d,) <- B at each of n states, q (n nq,) and v (n d,); return False at the first that is not valid."""
-    d = at.mechanism.dof_body.shape[0]
-    n = v.shape[0] // max(d, 1)
-    for k in range(n):
-        place, rates = q[k * q.shape[0] // n : (k + 1) * q.shape[0] // n], v[k * d : (k + 1) * d]
-        if misplaced_body(at.mechanism, place) >= 0 or not all_finite(rates):
-            return False
-        forward_kinematics(at.mechanism, place, at.workspace)
-        bias(at.mechanism, at.workspace, rates, out[k * d : (k + 1) * d])
-    return True
+def bias_at(m, w, q, v, out):
+    """out (d,) <- B at the state (q, v); return False if it is not valid."""
+    valid = misplaced_body(m, q) < 0 and all_finite(v)
+    if valid:
+        forward_kinematics(m, q, w)
+        bias(m, w, v, out)
+    return valid
 
 
 @kernel
@@ -145,27 +129,22 @@ def poses_along(m, w, q, out):
                 out[k, b, 2] = arc_tangent(w.rotation[b, 1, 0], w.rotation[b, 0, 0])
             else:
                 out[k, b, 2] = w.position[b, 2]
-                out[k, b, 3], out[k, b, 4], out[k, b, 5], out[k, b, 6] = quaternion_of(w.rotation[b])
+                write_quaternion(w.rotation[b], out[k, b, 3:])
 
 
 @kernel
-def quaternion_of(r):
-    """Quaternion x, y, z, w >= 0 of a rotation (3, 3), computed from its largest component to avoid cancellation."""
+def write_quaternion(r, q):
+    """q <- x, y, z, w >= 0 of a rotation (3, 3), computed from the largest of them to avoid cancellation."""
     trace = r[0, 0] + r[1, 1] + r[2, 2]
-    if trace > max(r[0, 0], r[1, 1], r[2, 2]):
+    i = 0 if r[0, 0] >= r[1, 1] and r[0, 0] >= r[2, 2] else 1 if r[1, 1] >= r[2, 2] else 2
+    j, k = (i + 1) % 3, (i + 2) % 3
+    if trace > r[i, i]:
         s = 2.0 * sqrt(1.0 + trace)
-        return (r[2, 1] - r[1, 2]) / s, (r[0, 2] - r[2, 0]) / s, (r[1, 0] - r[0, 1]) / s, 0.25 * s
-    if r[0, 0] >= r[1, 1] and r[0, 0] >= r[2, 2]:
-        s = 2.0 * sqrt(1.0 + r[0, 0] - r[1, 1] - r[2, 2])
-        x, y, z, w = 0.25 * s, (r[0, 1] + r[1, 0]) / s, (r[0, 2] + r[2, 0]) / s, (r[2, 1] - r[1, 2]) / s
-    elif r[1, 1] >= r[2, 2]:
-        s = 2.0 * sqrt(1.0 + r[1, 1] - r[0, 0] - r[2, 2])
-        x, y, z, w = (r[0, 1] + r[1, 0]) / s, 0.25 * s, (r[1, 2] + r[2, 1]) / s, (r[0, 2] - r[2, 0]) / s
+        q[i], q[j], q[k], q[3] = (r[k, j] - r[j, k]) / s, (r[i, k] - r[k, i]) / s, (r[j, i] - r[i, j]) / s, 0.25 * s
     else:
-        s = 2.0 * sqrt(1.0 + r[2, 2] - r[0, 0] - r[1, 1])
-        x, y, z, w = (r[0, 2] + r[2, 0]) / s, (r[1, 2] + r[2, 1]) / s, 0.25 * s, (r[1, 0] - r[0, 1]) / s
-    sign = -1.0 if w < 0.0 else 1.0
-    return sign * x, sign * y, sign * z, sign * w
+        s = 2.0 * sqrt(1.0 + r[i, i] - r[min(j, k), min(j, k)] - r[max(j, k), max(j, k)])
+        s = s if r[k, j] >= r[j, k] else -s
+        q[i], q[j], q[k], q[3] = 0.25 * s, (r[i, j] + r[j, i]) / s, (r[i, k] + r[k, i]) / s, (r[k, j] - r[j, k]) / s
 
 
 @kernel

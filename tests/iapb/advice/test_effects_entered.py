@@ -103,7 +103,7 @@ CASES = {
 # effect -> text of what only it executes
 ONLY = {
     "gravity": ["def gravity("],
-    "friction": ["def add_friction(", "def friction_share("],
+    "friction": ["def friction_share("],
     "contact_damping": ["force -= damping * normal_velocity"],
     "clustering": ["def cluster("],
     "coherence": ["def same_surface(", "def squared_distance("],

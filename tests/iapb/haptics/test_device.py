@@ -82,24 +82,6 @@ def test_physical_damping_takes_energy():
     assert all(later < before for before, later in zip(energies, energies[1:], strict=False))
 
 
-@pytest.mark.parametrize(
-    ("argument", "settings"),
-    [
-        ("mass_matrix", {"mass_matrix": -MASS}),
-        ("mass_matrix", {"mass_matrix": np.triu(MASS)}),
-        ("q", {"q": [0.0, 0.0]}),
-        ("dt", {"dt": 0.0}),
-        ("delay", {"delay": -1}),
-        ("damping", {"damping": [-1.0, 0.0, 0.0]}),
-        ("force_limit", {"force_limit": [1.0]}),
-    ],
-)
-def test_wrong_arguments_are_named(argument, settings):
-    with pytest.raises(ArgumentError) as caught:
-        SimulatedDevice(**{"mass_matrix": MASS, "q": REST, "dt": DT, **settings})
-    assert caught.value.argument.split()[0] == argument
-
-
 GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)
 
 
