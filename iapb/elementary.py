@@ -81,12 +81,6 @@ def sine_cosine(angle):
 
 
 @kernel
-def sine(angle):
-    """Return sin of an angle [rad]."""
-    return sine_cosine(angle)[0]
-
-
-@kernel
 def _power_of_two(largest):
     """Return a power of two that scales a number so that its square neither over- nor underflows."""
     return 2.0**600 if largest < 2.0**-400 else (2.0**-600 if largest > 2.0**400 else 1.0)

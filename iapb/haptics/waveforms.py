@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from iapb.elementary import sine
+from iapb.elementary import sine_cosine
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.schema import Floats
@@ -36,5 +36,5 @@ def waveform_weights(name: str, dt: float) -> Floats:
     if name == "step":
         return np.ones(1)
     count = max(1, round(PULSE_SECONDS / dt))
-    weights = np.array([sine(angle) for angle in (np.pi * (np.arange(count) + 0.5) / count).tolist()])
+    weights = np.array([sine_cosine(angle)[0] for angle in (np.pi * (np.arange(count) + 0.5) / count).tolist()])
     return weights / math.fsum(weights)

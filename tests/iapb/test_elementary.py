@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb.double_double import add_product, kinetic_energies, quadratic_forms, two_product, two_sum
-from iapb.elementary import arc_tangent, hypotenuse, sine, sine_cosine
+from iapb.elementary import arc_tangent, hypotenuse, sine_cosine
 from iapb.linalg import product
 
 NUMBERS = np.random.default_rng(8)
@@ -35,7 +35,8 @@ def _rounded(function: Callable[..., object], *values: float) -> float:
 
 
 @pytest.mark.parametrize(("own", "exact", "inputs"), [
-    (sine, mpmath.sin, ANGLES[:, None]), (lambda x: sine_cosine(x)[1], mpmath.cos, ANGLES[:, None]),
+    (lambda x: sine_cosine(x)[0], mpmath.sin, ANGLES[:, None]),
+    (lambda x: sine_cosine(x)[1], mpmath.cos, ANGLES[:, None]),
     (arc_tangent, mpmath.atan2, POINTS), (hypotenuse, mpmath.hypot, POINTS),
 ])
 def test_functions_are_rounded_correctly(own: Any, exact: Callable[..., object], inputs: np.ndarray) -> None:

@@ -63,7 +63,17 @@ def add_impact_friction(d, count, rank, work, push, f, impulses):
     times a factor that keeps p_t within the friction cones if no p_t obeys Coulomb's law.
     """
     p, u, change, moved = f.p[: count * f.velocity.shape[0]], work.u[:d], work.change[:d], f.moved[:d]
-    scale = split_tangents(count, rank, work, f, d)
+    lower, largest = work.lower, 0.0
+    for j in range(p.shape[0]):  # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
+        row, slip = f.rows[j, :d], 0.0
+        for k in range(d):  # L x = row
+            row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
+            slip += row[k] * (u[k] + change[k])
+        f.speed[j], before = slip, dot_of(row, row)
+        largest = max(largest, before)
+        if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
+            row[:] = 0.0
+    scale = math.sqrt(largest) * math.sqrt(dot_of(u, u))  # of the rounding of a tangential velocity [m/s]
     met = settle_friction(count, rank, work, push, f, d, scale)
     share = share_within_cone(count, f)
     combine(count, f)
@@ -72,32 +82,13 @@ def add_impact_friction(d, count, rank, work, push, f, impulses):
     alpha = passive_share(u, change, moved)
     share *= alpha
     add_multiple(change, alpha, moved)
-    from_whitened(work.lower, change, work.v_change)
+    from_whitened(lower, change, work.v_change)
     clamp = apply_change(d, True, work)
     for i in range(count):
         impulses[i] = clamp * (f.without[i] + share * (f.wanted[i] - f.without[i]))
     for j in range(p.shape[0]):
         p[j] *= clamp * share
     return share, clamp, met
-
-
-@kernel
-def split_tangents(count, rank, work, f, d):
-    """Whiten the tangents' rows, write the slip, and remove the span of the normal rows: write B and A_t Qᵀ.
-
-    Returns the largest |A_t,j| |u| [m/s], the scale of the rounding of a tangential velocity.
-    """
-    lower, u, largest = work.lower, work.u[:d], 0.0
-    for j in range(count * f.velocity.shape[0]):
-        row, slip = f.rows[j, :d], 0.0
-        for k in range(d):  # L x = row
-            row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
-            slip += row[k] * (u[k] + work.change[k])
-        f.speed[j], before = slip, dot_of(row, row)
-        largest = max(largest, before)
-        if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
-            row[:] = 0.0
-    return math.sqrt(largest) * math.sqrt(dot_of(u, u))
 
 
 @kernel

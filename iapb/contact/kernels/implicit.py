@@ -62,8 +62,20 @@ def rest_implicitly(world, state, rubs):
 
 @kernel
 def rest_group(world, state, group, s):
-    """Solve one group, with s rows a contact, and give its trees their new velocity."""
-    size = place_trees(world, state, group)
+    """Solve one group, with s rows a contact, and give its trees their new velocity.
+
+    The first guess is the velocity before the forces of the step.
+    """
+    work, size, t = state.rest_work, 0, group
+    while t >= 0:
+        work.offset[t] = begin = size
+        for dof in range(world.tree_start[t], world.tree_stop[t]):
+            work.dof[size], work.begin[size], work.envelope[size] = dof, begin, begin
+            work.end[size] = begin + world.tree_stop[t] - world.tree_start[t]
+            work.free[size], work.v[size] = state.v[dof], state.start_v[dof]
+            size += 1
+        t = work.next_tree[t]
+    work.energy[0] = -1.0  # not known yet
     count = gather_contacts(world, state, group, s)
     k = world.stiffness * world.dt + world.damping
     solved = solve(world, state, size, count, s, k)
@@ -74,22 +86,6 @@ def rest_group(world, state, group, s):
     if not solved:
         guard(world, state, size, count, s)
     give_back(world, state, size, count, s)
-
-
-@kernel
-def place_trees(world, state, group):
-    """Number the coordinates of the group; copy v* and the first guess, the velocity before the forces of the step."""
-    work, size, t = state.rest_work, 0, group
-    while t >= 0:
-        work.offset[t] = begin = size
-        for k in range(world.tree_start[t], world.tree_stop[t]):
-            work.dof[size], work.begin[size], work.envelope[size] = k, begin, begin
-            work.end[size] = begin + world.tree_stop[t] - world.tree_start[t]
-            work.free[size], work.v[size] = state.v[k], state.start_v[k]
-            size += 1
-        t = work.next_tree[t]
-    work.energy[0] = -1.0  # not known yet
-    return size
 
 
 @kernel

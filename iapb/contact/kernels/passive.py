@@ -181,12 +181,6 @@ def gain_signs(masses, v, w, signs):
 
 
 @kernel
-def never_gains(mass_matrix, v, w):
-    """Return whether w has certainly no more kinetic energy than v."""
-    return gain_enclosure(mass_matrix, v, w)[1] <= 0.0
-
-
-@kernel
 def write_step(v, change, factor, w):
     """Write w = v + factor · change."""
     for k in range(v.shape[0]):
@@ -204,7 +198,7 @@ def passive_step(mass_matrix, v, change, alpha, w):
     of v⁺.
     """
     write_step(v, change, alpha, w)
-    if never_gains(mass_matrix, v, w):
+    if gain_enclosure(mass_matrix, v, w)[1] <= 0.0:
         return alpha
     longest, step, turned = alpha - passive_range(mass_matrix, v, change)[0], 2.0**-52 * alpha, False
     while longest > 0.0:
@@ -214,7 +208,7 @@ def passive_step(mass_matrix, v, change, alpha, w):
                 return alpha
         step = min(step, longest)
         write_step(v, change, alpha - step, w)
-        if never_gains(mass_matrix, v, w):
+        if gain_enclosure(mass_matrix, v, w)[1] <= 0.0:
             return alpha - step
         if step >= longest:
             break
@@ -236,7 +230,7 @@ def _turned(mass_matrix, v, change, alpha, w):
                 momentum += (mass_matrix[i, j] + mass_matrix[j, i]) * w[j]
             if change[i] != 0.0 and momentum != 0.0:
                 w[i] = np.nextafter(w[i], -math.inf if momentum > 0.0 else math.inf)
-        if never_gains(mass_matrix, v, w):
+        if gain_enclosure(mass_matrix, v, w)[1] <= 0.0:
             return True
     return False
 

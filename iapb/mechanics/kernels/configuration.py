@@ -7,7 +7,7 @@ normalized to length one. Velocities in body axes (free flyer) follow the screw 
 from math import sqrt
 
 from iapb.compiled import kernel
-from iapb.elementary import arc_tangent, sine, sine_cosine
+from iapb.elementary import arc_tangent, sine_cosine
 from iapb.linalg import add, cross, dot, scale
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, SPHERICAL
 
@@ -58,8 +58,8 @@ def integrate_in_space(m, b, q, v, dt, out):
     if angle < SMALL_ANGLE:
         first, second = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
     else:
-        half = sine(0.5 * angle)
-        first, second = 2.0 * half * half / square, (angle - sine(angle)) / (square * angle)
+        half, whole = sine_cosine(0.5 * angle)[0], sine_cosine(angle)[0]
+        first, second = 2.0 * half * half / square, (angle - whole) / (square * angle)
     turned = cross(phi, u)
     path = add(u, add(scale(first, turned), scale(second, cross(phi, turned))))
     path = turn_vector(q[i + 3], q[i + 4], q[i + 5], q[i + 6], path)
