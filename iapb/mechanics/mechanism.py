@@ -33,7 +33,7 @@ def _entries_for(kind: Any) -> SimpleNamespace:
     """Return the kernels that Python calls with mechanisms of this type of block (see `Entry`)."""
     return SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
         configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
-        linalg.all_finite, evaluation.bias_at, evaluation.centroidal_momentum, evaluation.displacements_along,
+        linalg.all_finite, evaluation.biases_at, evaluation.centroidal_momentum, evaluation.displacements_along,
         evaluation.energies_along, evaluation.mass_matrices_at, evaluation.misplaced_body, evaluation.poses_along,
         evaluation.rows_along, kinematics.forward_kinematics, kinematics.frame_jacobian)})
 
@@ -165,16 +165,26 @@ class Mechanism:
         places = float_array("qs", qs, (-1, self.nq))
         out = np.empty((len(places), self.nv, self.nv))
         if not self._entries.mass_matrices_at(self._parts, self._scratch.parts, places, out):
-            self._check_places(places)
+            self._check_states(places)
         return out
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
         place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
-        out = np.empty(self.nv)
-        if not self._entries.bias_at(self._parts, self._scratch.parts, place, rates, out):
+        out = np.empty((1, self.nv))
+        if not self._entries.biases_at(self._parts, self._scratch.parts, place[None], rates[None], out):
             self._place(place)
             self._rates(rates)
+        return out[0]
+
+    def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
+        """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
+        places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
+        if len(places) != len(rates):
+            raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
+        out = np.empty(rates.shape)
+        if not self._entries.biases_at(self._parts, self._scratch.parts, places, rates, out):
+            self._check_states(places, rates)
         return out
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
@@ -207,7 +217,7 @@ class Mechanism:
             raise ArgumentError("bodies, points and directions", len(spots), f"{len(places)} each, as many as qs")
         if len(fixed_to) and not -1 <= fixed_to.min() <= fixed_to.max() < len(self.names):
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
-        self._check_places(places)
+        self._check_states(places)
         given = self._scratch.workspace, places, fixed_to, spots, along
         return self._filled((len(places), self.nv), self._entries.rows_along, *given)
 
@@ -267,6 +277,8 @@ class Mechanism:
             raise ArgumentError(f"{name} of body {self.names[b]!r}", place[of_unit], "entries of total length one")
         return place
 
-    def _check_places(self, places: Floats) -> None:
+    def _check_states(self, places: Floats, rates: Floats | tuple[()] = ()) -> None:
         for k, q in enumerate(places):
             self._place(q, f"qs[{k}]")
+        for k, v in enumerate(rates):
+            self._rates(v, f"vs[{k}]")

@@ -43,13 +43,14 @@ def mass_matrices_at(m, w, q, out):
 
 
 @kernel
-def bias_at(m, w, q, v, out):
-    """out (d,) <- B at the state (q, v); return False if it is not valid."""
-    valid = misplaced_body(m, q) < 0 and all_finite(v)
-    if valid:
-        forward_kinematics(m, q, w)
-        bias(m, w, v, out)
-    return valid
+def biases_at(m, w, q, v, out):
+    """out (n, d) <- B at each of n states, q (n, nq) and v (n, d); return False at the first that is not valid."""
+    for k in range(q.shape[0]):
+        if misplaced_body(m, q[k]) >= 0 or not all_finite(v[k]):
+            return False
+        forward_kinematics(m, q[k], w)
+        bias(m, w, v[k], out[k])
+    return True
 
 
 @kernel

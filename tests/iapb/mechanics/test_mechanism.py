@@ -188,6 +188,8 @@ def test_names_units_and_layout():
     (lambda: two_link_arm().mass_matrix([["a", "b"]]), "q"),
     (lambda: two_link_arm().mass_matrices([[0.0]]), "qs"),
     (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
+    (lambda: two_link_arm().biases([[0.0, 0.0]], [[0.0, 0.0], [0.0, np.inf]]), "as many rows as qs"),
+    (lambda: two_link_arm().biases([[0.0, 0.0]] * 2, [[0.0, 0.0], [0.0, np.inf]]), r"vs\[1\]"),
     (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
     (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),
     (lambda: two_link_arm().rows_along([[0.0, 0.0]], [0, 1], [[0, 0, 0]], [[1, 0, 0]]), "as many as qs"),
@@ -200,13 +202,17 @@ def test_errors_name_the_argument(call, named):
 
 
 @given(seeds, st.integers(0, 5))
-def test_many_configurations_give_bit_for_bit_what_each_gives_alone_in_any_layout(seed: int, count: int) -> None:
+def test_many_states_give_bit_for_bit_what_each_gives_alone_in_any_layout(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     mechanism = random_mechanism(rng, 5)
-    qs = np.array([random_state(rng, mechanism)[0] for _ in range(count)]).reshape(count, mechanism.nq)
+    states = [random_state(rng, mechanism) for _ in range(count)]
+    qs, vs = (np.array([state[i] for state in states]).reshape(count, -1 if count else n)
+              for i, n in enumerate((mechanism.nq, mechanism.nv)))
     masses = np.array([mechanism.mass_matrix(q) for q in qs]).reshape(count, mechanism.nv, mechanism.nv)
+    biases = np.array([mechanism.bias(q, v) for q, v in zip(qs, vs, strict=True)]).reshape(vs.shape)
     for layout in (np.asarray, np.asfortranarray, lambda rows: np.repeat(rows, 2, axis=1)[:, ::2]):
         np.testing.assert_array_equal(mechanism.mass_matrices(layout(qs)), masses)
+        np.testing.assert_array_equal(mechanism.biases(layout(qs), layout(vs)), biases)
 
 
 @pytest.mark.parametrize("name", ["arm_obstacles", "peg_hole_space", "arm_pushing"])
