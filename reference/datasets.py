@@ -62,7 +62,6 @@ class StoredProblem:
     problem: ImpactProblem
     stored_impulse: Floats | None = None  #: (n,) multipliers in the file
     remark: str = ""  #: text in the file
-    format: str = ""  #: name of the format
 
 
 def read_problem(path: Path | str) -> StoredProblem:
@@ -80,11 +79,11 @@ def read_problem(path: Path | str) -> StoredProblem:
         The file is an FCLIB problem, and h5py is not installed.
     """
     path = Path(path)
-    reader = next((reader for ending, reader in _READERS.items() if path.name.lower().endswith(ending)), None)
-    if reader is None:
+    readers = [reader for ending, reader in _READERS.items() if path.name.lower().endswith(ending)]
+    if not readers:
         raise DatasetError(path, f"unknown kind of file; known are {', '.join(_READERS)}")
     try:
-        return reader(path)
+        return readers[0](path)
     except MissingDependencyError:
         raise
     except Exception as error:  # a damaged or foreign file can raise any exception
@@ -120,7 +119,7 @@ def _square(size: str, words: list[str]) -> tuple[Floats, Floats]:
 
 def _lcp(path: Path) -> StoredProblem:
     n, *words = _text(path).split()
-    return StoredProblem(ImpactProblem.from_delassus(*_square(n, words), name=path.name), format="LCP text")
+    return StoredProblem(ImpactProblem.from_delassus(*_square(n, words), name=path.name))
 
 
 def _siconos_lcp(path: Path) -> StoredProblem:
@@ -129,8 +128,7 @@ def _siconos_lcp(path: Path) -> StoredProblem:
     if int(flag) != 0 or sizes != [n] * 4:
         raise ValueError(f"storage flag {flag}, sizes {sizes}: expected flag 0 (dense) and four times {n}")
     matrix, q = _square(n, numbers)
-    problem = ImpactProblem.from_delassus(matrix.T, q, name=path.name)
-    return StoredProblem(problem, remark=" ".join(remark), format="Siconos LCP")
+    return StoredProblem(ImpactProblem.from_delassus(matrix.T, q, name=path.name), remark=" ".join(remark))
 
 
 def _mlcp(path: Path) -> StoredProblem:
@@ -151,7 +149,7 @@ def _mlcp(path: Path) -> StoredProblem:
     w, q = _square(str(len(words["E"])), words["HCHt"] + words["E"])
     joints = bilateral if bilateral.any() or len(bilateral) != len(q) else None
     problem = ImpactProblem.from_delassus(w, q, bilateral=joints, name=path.name)
-    return StoredProblem(problem, np.array(words["lambda"], np.float64), remark, "MLCP text")
+    return StoredProblem(problem, np.array(words["lambda"], np.float64), remark)
 
 
 def _fclib(path: Path) -> StoredProblem:
@@ -161,7 +159,7 @@ def _fclib(path: Path) -> StoredProblem:
         kind = "fclib_local" if "fclib_local" in file else "fclib_global"
         group = file[kind]
         given: dict[str, Any] = {"restitution": 0.0, "friction": _numbers(group, "vectors/mu"), "name": path.name,
-                 "contact_size": _whole(group, "spacedim")}  # fmt: skip
+                 "contact_size": index(_numbers(group, "spacedim", None).item())}  # fmt: skip
         if given["contact_size"] not in (2, 3):
             raise ValueError(f"spacedim {given['contact_size']}: expected 2 or 3")
         if kind == "fclib_global":
@@ -172,7 +170,7 @@ def _fclib(path: Path) -> StoredProblem:
         r = _numbers(file, "solution/r") if "solution/r" in file else np.zeros(0)
         stored = r if r.any() and len(r) == problem.size else None  # zeros are a placeholder, not a solution
         title = bytes(group["info/title"][()]) if "info/title" in group else b""
-        return StoredProblem(problem, stored, " ".join(title.decode("utf-8", "replace").rstrip("\0").split()), kind)
+        return StoredProblem(problem, stored, " ".join(title.decode("utf-8", "replace").rstrip("\0").split()))
 
 
 def _condensed(group: Any, given: dict[str, Any]) -> ImpactProblem:
@@ -201,15 +199,11 @@ def _numbers(group: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
     return np.asarray(dataset[()], dtype).ravel()
 
 
-def _whole(group: Any, name: str) -> int:
-    return index(_numbers(group, name, None).item())
-
-
 def _matrix(group: Any, most: int) -> Any:
     """Return a CXSparse matrix as a sparse matrix of compressed columns."""
     from scipy import sparse
 
-    m, n, nz = (_whole(group, key) for key in ("m", "n", "nz"))
+    m, n, nz = (index(_numbers(group, key, None).item()) for key in ("m", "n", "nz"))
     i, p, x = _numbers(group, "i", None), _numbers(group, "p", None), _numbers(group, "x")
     if not (0 <= m <= most and 0 <= n <= most):
         raise ValueError(f"{group.name} of {m} x {n}: expected at most {most} rows and columns")

@@ -80,8 +80,14 @@ class RigidConstraints:
         return {**asdict(self), "restitution where Newton's law has no solution or gains energy": "Poisson"}
 
     def cost(self, system: Any) -> Cost:
-        """Return what a step of the law costs in a system."""
-        return cost_of(system)
+        """Estimate the cost of a step from the scene alone, with the contacts of every pair of shapes, near or far.
+
+        A circle or ball has one contact with anything, two boxes in the plane up to two, and in space up to eight.
+        """
+        kind, d = system.shapes.kind, system.mechanism.nv
+        points = np.where(np.isin(kind, (BOX, *ENDLESS)), BOX_CORNERS, np.where(kind == POLYGON, 2, 1))
+        contacts = int(points[system.pairs].min(axis=1).sum()) + len(system.stops.bound)
+        return Cost(contacts, d, SECONDS_A_STEP + SECONDS_AN_ENTRY * contacts * d)
 
     @one_thread()
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
@@ -94,7 +100,7 @@ class RigidConstraints:
         forces and damping.
         """
         entries = len(system.pairs) * system.mechanism.nv
-        if entries > MOST_ENTRIES // BOX_CORNERS and (cost := cost_of(system)).too_large:
+        if entries > MOST_ENTRIES // BOX_CORNERS and (cost := self.cost(system)).too_large:
             raise ArgumentError("scene", system.scene.name, f"at most {MOST_ENTRIES:,} numbers in the rows of a rigid "
                                 f"step; {cost.contacts:,} contacts of {cost.coordinates:,} coordinates have "
                                 f"{cost.contacts * cost.coordinates:,}. Fewer bodies, or the world IAPB")
@@ -159,19 +165,6 @@ class Cost(NamedTuple):
     def too_large(self) -> bool:
         """Whether the rows of one step have more than MOST_ENTRIES entries."""
         return self.contacts * self.coordinates > MOST_ENTRIES
-
-
-def cost_of(system: Any) -> Cost:
-    """Estimate the cost of a step from the scene alone, with the contacts of every pair of shapes, near or far.
-
-    A circle or ball has one contact with anything, two boxes in the plane up to two, and in space up to eight.
-    """
-    shapes, pairs = system.shapes, system.pairs
-    points = np.where(shapes.kind == BOX, BOX_CORNERS, np.where(shapes.kind == POLYGON, 2, 1))
-    points = np.where(np.isin(shapes.kind, ENDLESS), BOX_CORNERS, points)
-    contacts = int(points[pairs].min(axis=1).sum()) + len(system.stops.bound)
-    d = system.mechanism.nv
-    return Cost(contacts, d, SECONDS_A_STEP + SECONDS_AN_ENTRY * contacts * d)
 
 
 def _blows(mass: Floats, found: contact_rows.ContactRows, impulse: Floats, approach: float) -> NDArray[np.bool_]:

@@ -61,11 +61,7 @@ def run_world(
     if not isinstance(scene, Scene):
         scene = load_scene(find_scene(scene))
     world = find_world(name, rendering)
-    run = simulate(scene, world.law, world.coupling_in(scene), world=label_of(name, rendering), progress=progress,
-                   **options)  # fmt: skip
+    label = name if rendering == "full" else f"{name} {rendering}"
+    run = simulate(scene, world.law, world.coupling_in(scene), world=label, progress=progress, **options)
     return run if partial else require_complete(run)
 
-
-def label_of(name: str, rendering: str) -> str:
-    """Return the label of a world and rendering for the record of a run."""
-    return name if rendering == "full" else f"{name} {rendering}"

@@ -249,7 +249,7 @@ def compare_impacts(
         why = f"{left_out} impacts follow another law than (21)" if left_out else "nothing collides"
         said = f"No impact of {scene.name} can be given to solvers: {why}."
         return [Part(said, NOT_TESTABLE, "impacts", optional=True)], {}
-    stored = [StoredProblem(problem, format="built here") for problem in problems]
+    stored = [StoredProblem(problem) for problem in problems]
     study = study_read(f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures)
     # IAPB's impacts equal those of the Newton LCP if all contacts push
     compared = compare_cases(impacts_of_run(run, scene)[0][:CASES], failures=failures)

@@ -6,9 +6,8 @@ texts, truth values, lists and mappings. Scalars follow YAML 1.2 (``1e-3`` is a 
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator
+from io import StringIO
 from typing import Any
 
 from iapb.errors import Mistake, SceneError
@@ -24,8 +23,6 @@ _WORDS: dict[str, Any] = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-_PLAIN = re.compile(r"[A-Za-z_][\w ./()*+-]*(?<! )", re.ASCII)  # a text that needs no quotes in YAML
-_OTHERWISE = ("null", "true", "false", "yes", "no", "on", "off", "y", "n")  # these need quotes all the same
 
 
 class Document:
@@ -119,32 +116,20 @@ def scalar(text: str) -> Any:
     return float(text) if _FLOAT.fullmatch(text) else text
 
 
-def block_lines(fields: dict[str, Any], indent: str = "") -> Iterator[str]:
-    """Yield the lines of a mapping; a list or mapping without nested ones is written on one line."""
-    for name, value in fields.items():
-        if not any(isinstance(item, dict | list) for item in (value.values() if isinstance(value, dict) else
-                                                              value if isinstance(value, list) else ())):
-            yield f"{indent}{name}: {_flow(value)}"
-            continue
-        yield f"{indent}{name}:"
-        if isinstance(value, dict):
-            yield from block_lines(value, indent + "  ")
-            continue
-        for item in value:
-            first, *rest = block_lines(item, indent + "  ") if isinstance(item, dict) else [f"{indent}  {_flow(item)}"]
-            yield f"{indent}- {first.lstrip()}"
-            yield from rest
+def yaml_text(fields: dict[str, Any]) -> str:
+    """Return a mapping as YAML; a list or mapping without nested ones is written on one line."""
+    from ruamel.yaml import YAML, SafeRepresenter
 
+    class Plain(SafeRepresenter):
+        def ignore_aliases(self, data: Any) -> bool:
+            return True
 
-def _flow(value: Any) -> str:
-    """Return a value written on one line."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_flow, value))}]"
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{name}: {_flow(item)}' for name, item in value.items())}}}"
-    if not isinstance(value, str):
-        return repr(value) if isinstance(value, float) else json.dumps(value)
-    if _PLAIN.fullmatch(value) and value.lower() not in _OTHERWISE:
-        return value
-    coded = (f"\\U{ord(c):08x}" if c in '"\\' or not c.isprintable() else c for c in value)
-    return f'"{"".join(coded)}"'
+        def represent_str(self, text: str) -> Any:  # in quotes if `scalar` would read a number
+            return self.represent_scalar("tag:yaml.org,2002:str", text, None if scalar(text) == text else '"')
+
+    Plain.add_representer(str, Plain.represent_str)
+    text, yaml = StringIO(), YAML(typ="safe", pure=True)  # type: tuple[StringIO, Any]
+    yaml.Representer = Plain
+    yaml.default_flow_style, yaml.width, yaml.sort_base_mapping_type_on_output = None, 1_000_000, False
+    yaml.dump(fields, text)
+    return text.getvalue()

@@ -19,7 +19,7 @@ from iapb.errors import ArgumentError, SceneError
 from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
 from iapb.scene.bodies import INERTIAL, ORIGIN, WORLD, Body, SpatialBody, SpatialWall, V, Wall, counted
-from iapb.scene.document import Document, block_lines
+from iapb.scene.document import Document, yaml_text
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
     Fraction,
@@ -243,7 +243,8 @@ class Scene(Part):
     couplings: Couplings = Field(default_factory=lambda: Couplings.model_validate({}), description="gains between "
         "device and tool")
 
-    _source_text: str = PrivateAttr("")
+    _source_text: str = PrivateAttr("")  # as read, or written at first use for a scene made of values
+    _about: str = PrivateAttr("")  # comment above a text that is not yet written
     _file: str = PrivateAttr("")  # file that the text was read from, if any
 
     @field_validator("duration")
@@ -289,6 +290,8 @@ class Scene(Part):
     @property
     def source_text(self) -> str:
         """The YAML text of this scene."""
+        if not self._source_text:
+            self._source_text, self._about = scene_text(self, self._about), ""
         return self._source_text
 
     def place_of(self, *path: str | int) -> str:
@@ -333,7 +336,7 @@ class Scene(Part):
             made = type(self).model_validate(plain)
         except ValidationError as failure:
             raise SceneError(mistakes_of(failure, f"scene {self.name} with new values", plain)) from failure
-        made._source_text = scene_text(made, f"{self.name} with new values for {', '.join(values) or 'nothing'}")
+        made._about = f"{self.name} with new values for {', '.join(values) or 'nothing'}"
         return made
 
 
@@ -451,7 +454,7 @@ def scene_kind(given: Any) -> type[Scene]:
 
 def scene_text(scene: Scene, comment: str = "") -> str:
     """Return the YAML text of this scene; reading it gives the same values to the last bit."""
-    return "\n".join([*([f"# {comment}"] if comment else []), *block_lines(scene.resolved()), ""])
+    return f"# {comment}\n" * bool(comment) + yaml_text(scene.resolved())
 
 
 def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:

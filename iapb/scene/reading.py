@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from iapb.errors import ArgumentError, Mistake, SceneError, shown
 from iapb.names import nearest, one_of
 from iapb.scene.document import MAX_CHARACTERS, Document
-from iapb.scene.model import Scene, scene_kind, scene_text
+from iapb.scene.model import Scene, scene_kind
 from iapb.scene.parts import mistakes_of
 from iapb.scene.robots import with_robots
 
@@ -120,5 +120,5 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     if given is document.value:
         scene._source_text, scene._file = text, file if file != "(text)" else ""
     else:
-        scene._source_text = scene_text(scene, f"{scene.name} with its robots as bodies")
+        scene._about = f"{scene.name} with its robots as bodies"
     return scene

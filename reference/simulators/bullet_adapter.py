@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import partial
-from importlib.metadata import version
 from math import sqrt
 from typing import Any
 
 from reference.simulators.scene import Cuboid, FixedScene, Obstacle, RigidBody, Sphere
-from reference.simulators.simulator import Settings, engine
+from reference.simulators.simulator import Settings, Simulator
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 DEFAULT_STEP = 1.0 / 240.0  # [s]
@@ -18,15 +17,10 @@ _SOLVER = ("numSolverIterations", "restitutionVelocityThreshold", "erp", "contac
 _BODY = ("linearDamping", "angularDamping", "contactProcessingThreshold")
 
 
-class Bullet:
+class Bullet(Simulator):
     """Adapter to PyBullet without a window."""
 
-    title = "Bullet"
-
-    def version(self) -> str:
-        """Return the installed version."""
-        engine("pybullet")
-        return version("pybullet")
+    title, module, package = "Bullet", "pybullet", "pybullet"
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return Bullet's step of 1/240 s with zero thresholds and damping, which would hide restitution.
@@ -45,7 +39,7 @@ class Bullet:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `stepSimulation`."""
-        bullet = _World(engine("pybullet"))
+        bullet = _World(self.engine())
         solver = {name: settings.options[name] for name in _SOLVER}
         bullet.setPhysicsEngineParameter(fixedTimeStep=step, numSubSteps=0, **solver)
         bullet.setGravity(*scene.gravity)

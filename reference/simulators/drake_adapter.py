@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from reference.simulators.scene import FixedScene, Obstacle, RigidBody, Sphere
-from reference.simulators.simulator import Settings, engine, viscous_dissipation_for
+from reference.simulators.simulator import Settings, Simulator, viscous_dissipation_for
 from reference.simulators.trajectory import SAMPLE_INTERVAL, Recorder, Trajectory
 
 STEP = 1e-3  # [s] its default for discrete plants
@@ -24,15 +23,10 @@ GIVEN_STIFFNESS, GIVEN_LOSSY_STIFFNESS = 1e4, 1e5
 DISCRETE, CONTINUOUS = "discrete (SAP)", "continuous (runge_kutta3)"
 
 
-class Drake:
+class Drake(Simulator):
     """Adapter to a MultibodyPlant."""
 
-    title = "Drake"
-
-    def version(self) -> str:
-        """Return the installed version."""
-        engine("pydrake.all", "drake")
-        return version("drake")
+    title, module, package = "Drake", "pydrake.all", "drake"
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the discrete defaults for resting scenes. Impact scenes get a given contact stiffness.
@@ -55,7 +49,7 @@ class Drake:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `Simulator.AdvanceTo`."""
-        drake, given = engine("pydrake.all", "drake"), settings.options
+        drake, given = self.engine(), settings.options
         plant, diagram, bodies = _build(drake, scene, settings, step)
         simulator = drake.Simulator(diagram)
         if given["mode"] == CONTINUOUS:

@@ -8,7 +8,7 @@ import numpy as np
 
 from iapb.errors import IapbError
 from reference.simulators.scene import UPRIGHT, Cuboid, FixedScene, Quaternion, Sphere, rotation
-from reference.simulators.simulator import Settings, damping_for, engine
+from reference.simulators.simulator import Settings, Simulator, damping_for
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 NO_RESTITUTION = "no coefficient e: a spring and damper per contact, stiff enough to part impacts, stand in for it"
@@ -20,14 +20,10 @@ HARD = "0.9999 0.9999 0.001 0.5 2"  # solimp: the largest impedance that MuJoCo 
 MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the default impedance is too small to carry the load
 
 
-class MuJoCo:
+class MuJoCo(Simulator):
     """Adapter to MuJoCo's compiled loop."""
 
-    title = "MuJoCo"
-
-    def version(self) -> str:
-        """Return the installed version."""
-        return str(engine("mujoco").__version__)
+    title, module, package = "MuJoCo", "mujoco", "mujoco"
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return defaults at rest, hard contacts for the stack, and for impacts a negative solref with damping."""
@@ -45,7 +41,7 @@ class MuJoCo:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with `mj_step(model, data, nstep)`."""
-        mujoco = engine("mujoco")
+        mujoco = self.engine()
         model = mujoco.MjModel.from_xml_string(_model_text(scene, settings, step))
         state = mujoco.MjData(model)
         # free joints: position and w, x, y, z; linear velocity in world axes, angular velocity in body axes

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from iapb.errors import IapbError
 from iapb.scene import Scene, scene_from_text
 from iapb.simulation import simulate
 from reference.simulators.scene import Cuboid, FixedScene, Floats, Sphere, rotation
-from reference.simulators.simulator import Settings
+from reference.simulators.simulator import Settings, Simulator
 from reference.simulators.trajectory import Trajectory, steps_between_samples
 from reference.time_stepping import RigidConstraints
 
@@ -25,14 +24,10 @@ COORDINATES, VELOCITIES = 7, 6  # number per free flyer
 STEP = 1e-3  # [s] the step at the haptic rate, for which both are designed
 
 
-class ImpulseAugmentedEngine:
+class ImpulseAugmentedEngine(Simulator):
     """iapb, with impulses at new contacts and penalty forces at lasting ones."""
 
-    title = "iapb (ours)"
-
-    def version(self) -> str:
-        """Our own."""
-        return version("iapb")
+    title, module, package = "iapb (ours)", "iapb", "iapb"
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the defaults of a scene: implicit contact whose stiffness follows from weights and sizes."""

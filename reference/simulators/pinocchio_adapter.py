@@ -13,7 +13,7 @@ from reference.contact_rows import find_rows
 from reference.rigid_body import model_of
 from reference.simulators.own_engines import own_scene, world_state
 from reference.simulators.scene import FixedScene
-from reference.simulators.simulator import Settings, engine
+from reference.simulators.simulator import Settings, Simulator
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 STEP = 1e-3  # [s] Pinocchio has no default step
@@ -22,14 +22,10 @@ MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the larger damping is needed
 APPROACHES = 1e-12  # [m/s] a slower approach is rounding error of a contact at rest
 
 
-class Pinocchio:
+class Pinocchio(Simulator):
     """Adapter to Pinocchio's impulse dynamics."""
 
-    title = "Pinocchio"
-
-    def version(self) -> str:
-        """Return the installed version."""
-        return str(engine("pinocchio", "pin").__version__)
+    title, module, package = "Pinocchio", "pinocchio", "pin"
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the settings, with the damping of the Delassus matrix that redundant rows need.
@@ -42,7 +38,7 @@ class Pinocchio:
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with semi-implicit steps; touching, approaching rows are resolved at once at the start of a step."""
-        pinocchio, damping = engine("pinocchio", "pin"), float(settings.options["inv_damping"])
+        pinocchio, damping = self.engine(), float(settings.options["inv_damping"])
         system = System(own_scene(scene, step, duration))
         q, v = (part.copy() for part in system.start)
         model = model_of(system.mechanism).model

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from functools import cache
 
 import numpy as np
 
 from iapb.errors import IapbError, MissingDependencyError, SolverError
 from reference.siconos_bridge import INSTALL, ask
 from reference.simulators.scene import FixedScene, rotation
-from reference.simulators.simulator import Settings
+from reference.simulators.simulator import Settings, Simulator
 from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
 
 STEP = 1e-3  # [s]
@@ -19,17 +18,17 @@ STEP = 1e-3  # [s]
 CONVERGED = 1e-3
 
 
-class Siconos:
+class Siconos(Simulator):
     """Adapter to siconos.kernel and siconos.mechanics."""
 
     title = "Siconos"
 
     def version(self) -> str:
         """Return the version of the Debian package, or "unknown" without one."""
-        found = _version()
-        if not found:
-            raise MissingDependencyError("siconos", "The Siconos adapter", INSTALL)
-        return found
+        try:
+            return str(ask({"do": "version"})["version"])
+        except (MissingDependencyError, SolverError) as error:  # no Siconos, or one that cannot simulate
+            raise MissingDependencyError("siconos", "The Siconos adapter", INSTALL) from error
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return theta = 1/2, which conserves energy at e = 1, and Gauss-Seidel: Lemke fails for redundant corners."""
@@ -54,12 +53,3 @@ class Siconos:
             spin = np.einsum("bij,bj->bi", rotation(turn), twist[:, 3:])
             record.add(time, q[:, :3], turn, twist[:, :3], spin, contacts)
         return record.trajectory()
-
-
-@cache
-def _version() -> str:
-    """Return the version, or "" if Siconos cannot be imported."""
-    try:
-        return str(ask({"do": "version"})["version"])
-    except (MissingDependencyError, SolverError):
-        return ""

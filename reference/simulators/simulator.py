@@ -1,4 +1,4 @@
-"""The protocol of adapters to engines, and the settings of an engine.
+"""The base class of adapters to engines, and the settings of an engine.
 
 For engines without a coefficient e, a spring and damper give the wanted restitution. Per unit of effective mass,
 x'' = −k x − b x' while the force pushes; contact ends when the force is zero (Schwager and Pöschel, Granular Matter 9,
@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from importlib.metadata import version
 from math import atan2, exp, log, pi, sqrt
-from typing import Any, Protocol
+from typing import Any
 
 from iapb.errors import ArgumentError, MissingDependencyError
 from reference.simulators.scene import FixedScene
 from reference.simulators.trajectory import Trajectory
 
 LOWEST = 0.14  # e of a nearly critically damped spring; below it there is no half period
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -33,10 +35,12 @@ class Settings:
         return ", ".join([f"step {1e3 * self.step:g} ms", *texts])
 
 
-class Simulator(Protocol):
+class Simulator:
     """An adapter of an engine. It imports the engine only in `version` and `run`."""
 
     title: str
+    module: str
+    package: str
 
     def version(self) -> str:
         """Return the version of the installed engine.
@@ -46,24 +50,24 @@ class Simulator(Protocol):
         MissingDependencyError
             The engine is not installed; the message says how to install it.
         """
-        ...
+        self.engine()
+        return version(self.package)
+
+    def engine(self) -> Any:
+        """Import the engine; if it is missing, raise a MissingDependencyError, which says how to install it."""
+        try:
+            return import_module(self.module)
+        except ImportError as error:
+            purpose = f"The adapter of {self.package}"
+            raise MissingDependencyError(self.package, purpose, "pip install 'iapb[peers]'") from error
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the engine's best settings for the scene; if `step` [s] is given, the best ones at this step."""
-        ...
+        raise NotImplementedError
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate the scene for a duration [s]."""
-        ...
-
-
-def engine(module: str, package: str = "") -> Any:
-    """Import an engine; if it is missing, raise a MissingDependencyError, which says how to install it."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        package = package or module
-        raise MissingDependencyError(package, f"The adapter of {package}", "pip install 'iapb[peers]'") from error
+        raise NotImplementedError
 
 
 def spring_restitution(damping_ratio: float) -> float:

@@ -52,11 +52,6 @@ def test_a_value_that_cannot_travel_travels_as_text() -> None:
     assert copy.argument == "law" and "lambda" in copy.value and copy.expected == "a contact law"
 
 
-def test_an_error_that_is_raised_elsewhere_is_caught_by_its_kind() -> None:
-    with pytest.raises(ValueError, match="mass = -1"):
-        raise pickle.loads(pickle.dumps(ERRORS[0]))
-
-
 SCENES = ("peg_corner", "peg_hole", "two_discs")
 
 

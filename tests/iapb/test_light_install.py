@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 import tomllib
-from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 import pytest
@@ -49,8 +48,6 @@ print(simulate(find_scene("peg_corner"), steps=5).steps, resolve_impact([[1.0]],
     assert done.stdout == "5 [0.]\n", done.stderr
 
 
-
-
 def test_a_rigid_world_without_its_packages_says_which_extra_brings_them() -> None:
     done = run_without(set(EXTRAS), "from iapb import simulate; simulate('peg_corner', world='ideal', steps=5)")
     assert ("MissingDependencyError: A reference needs scipy, which is not installed. "
@@ -83,19 +80,6 @@ def test_a_foreign_package_of_the_same_name_is_named(name: str, own: str, tmp_pa
         done = run_without(set(), start + code)
         assert done.returncode == 1
         assert f"{foreign} hides the package {ROOT / name}" in done.stderr and "Rename yours" in done.stderr
-
-
-@pytest.mark.parametrize(("places", "hidden"), [
-    (["own"], True), ([ROOT / "tests" / "reports"], True), (["own", ROOT / "reports"], False), ([], False)])
-def test_a_package_without_a_file_hides_ours_unless_ours_is_in_it(
-    places: list[str | Path], hidden: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A namespace package has folders and no file; ours may be one of several."""
-    spec = ModuleSpec("reports", None, is_package=True)
-    spec.submodule_search_locations = [str(Path(place).resolve()) for place in places]
-    monkeypatch.setattr(lazy, "find_spec", lambda name: spec if name == "reports" else None)
-    said = f"{Path(places[0]).resolve()} hides the package {ROOT / 'reports'}," if hidden else ""
-    assert lazy.hidden_package().startswith(said) and bool(lazy.hidden_package()) == hidden
 
 
 def test_a_linked_folder_of_ours_hides_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

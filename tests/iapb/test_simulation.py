@@ -138,11 +138,6 @@ def test_wrong_arguments_are_named_with_value_and_expectation(argument, value):
     assert str(caught.value).startswith(f"{argument} = ")
 
 
-def test_without_a_coupling_no_device_moves():
-    run = simulate(PEG, coupling=NoCoupling(), steps=20)
-    assert run.coupling == "none" and np.array_equal(run.device_q, np.tile(run.device_q[0], (21, 1)))
-
-
 def test_a_scene_has_a_name_and_a_world_selects_the_law_and_its_coupling():
     run = simulate("peg_corner", world="PB", steps=3)
     assert (run.world, run.law, run.coupling) == ("PB", "penalty", "four-channel")

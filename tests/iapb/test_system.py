@@ -74,12 +74,6 @@ def test_couplings_come_from_the_scene_and_their_absence_is_said():
         coupling_of(load_scene(find_scene("two_discs")), "unilateral")
 
 
-@pytest.mark.parametrize("gains", [((1.0,), (1.0,)), ((1.0,) * 4, (1.0,) * 4)])
-def test_gains_for_another_tool_are_refused_before_a_kernel_reads_them(gains):
-    with pytest.raises(ArgumentError, match="coupling stiffness = .*expected 3 values"):
-        System(PEG).make_port(FourChannel(*gains))
-
-
 def test_a_device_needs_a_hand():
     with pytest.raises(ArgumentError, match="has no hand, so no device"):
         System(load_scene(find_scene("two_discs"))).make_port(FourChannel((1.0,), (1.0,)))

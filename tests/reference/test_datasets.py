@@ -43,7 +43,7 @@ def test_every_file_is_read() -> None:
     assert {path.suffix for path in files} == {".gz", ".dat", ".txt", ".hdf5"}
     for path in files:
         stored = read_problem(path)
-        assert stored.problem.name == path.name and stored.format
+        assert stored.problem.name == path.name
         assert path.name != "Box_Stacks-i0122-82-5.hdf5" or stored.stored_impulse is None  # only a placeholder
 
 

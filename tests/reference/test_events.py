@@ -18,7 +18,6 @@ from reference.complementarity import ImpactProblem
 from reference.complementarity.laws import Outcome, poisson
 from reference.event_driven import LinearSystem, event_driven
 from reference.rigid_body import model_of
-from reference.rigid_step import rigid_step
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
 from tests.reference.scenes import G, scene_of
@@ -70,50 +69,6 @@ def test_a_resting_contact_opens_when_the_force_lifts_it_and_equal_elastic_balls
     assert event_driven(lifted, [0.0], [0.0], 2.0).state([2.0])[0][0, 0] == pytest.approx(2.0)
     exact = event_driven(row_of_balls([1.0, 1.0, 1.0], 1.0), [0.0, 1.0, 2.5], [1.0, 0.0, 0.0], 10.0)
     assert exact.v[-1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-14)
-
-
-def anitescu(system: LinearSystem, q: list[float], v: list[float], dt: float, steps: int):  # type: ignore[no-untyped-def]
-    states = [(np.array(q), np.array(v))]
-    for _ in range(steps):
-        at, moving = states[-1]
-        moved = rigid_step(system.mass_matrix, moving, system.force, dt, system.rows, system.gap(at),
-                           system.rows @ moving, system.restitution).velocity  # fmt: skip
-        states.append((at + dt * moved, moved))
-    return tuple(np.array(part) for part in zip(*states, strict=True))
-
-
-SCENES = {
-    "ball, e = 0.8": (ball(0.8), [1.0], [0.0], 1.3),
-    "ball, plastic": (ball(0.0), [1.0], [0.0], 0.8),
-    "block in a corner": (
-        LinearSystem(2.0 * np.eye(2), [1.0, -4.0], [[0.0, 1.0], [-1.0, 0.0]], [0.0, 1.0], 0.0),
-        [0.0, 0.25], [0.0, 0.0], 3.0,
-    ),
-    "cradle": (row_of_balls([1.0, 2.0, 1.0], 0.6), [0.0, 0.51, 1.23], [1.0, 0.0, -0.3], 2.0),
-}  # fmt: skip
-
-
-COARSE, FINE = (97, 130, 200, 231, 310), (1603, 2010, 2777, 3200, 4099)  # impacts fall anywhere in a step
-
-
-def error_per_step(scene: str, counts: tuple[int, ...]) -> np.ndarray:
-    """Largest error divided by the step, over step counts: positions in the sup norm, velocities in L1."""
-    system, q, v, duration = SCENES[scene]
-    exact = event_driven(system, q, v, duration)
-    found = []
-    for n in counts:
-        dt = duration / n
-        stepped_q, stepped_v = anitescu(system, q, v, dt, n)
-        true_q, true_v = exact.state(np.minimum(dt * np.arange(n + 1), exact.end))
-        found.append([np.abs(stepped_q - true_q).max() / dt, np.abs(stepped_v - true_v).sum(axis=0).max()])
-    return np.max(found, axis=0)
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_time_stepping_converges_at_first_order(scene: str) -> None:
-    """The worst error divided by the step stays the same from some 200 to some 3000 steps (a factor 16)."""
-    coarse, fine = (error_per_step(scene, counts) for counts in (COARSE, FINE))
-    assert (fine <= 1.5 * coarse + 1e-9).all(), (coarse, fine)
 
 
 def test_the_law_of_the_impacts_is_the_callers() -> None:
@@ -242,16 +197,6 @@ def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
     assert run.v[step + 1] == pytest.approx([-came / (1.0 + 1e-3 * damping)], rel=1e-12)
     assert certify(run).gains == 0 and np.abs(run.energy["impact_loss"]).max() <= 1e-12 * came**2
     assert (np.diff(run.energy["friction_work"]) < 0.0).all()
-
-
-def test_blows_of_damped_joints_gain_nothing_and_a_huge_damping_holds_them() -> None:
-    damped = {"bodies.upper.joint_damping": 900.0, "bodies.lower.joint_damping": 5.0, "contact.restitution": 1.0}
-    run = run_world(limited_arm(gravity=None, **damped, duration=0.05, **{"bodies.lower.velocity": [300.0]}), "ideal")
-    lost = np.diff(run.energy["impact_loss"], prepend=0.0)[run.impacts.step]
-    assert len(lost) and (lost >= -1e-9).all() and (np.diff(run.energy["kinetic"]) <= 1e-9).all()
-    stiff = {"bodies.upper.joint_damping": 1e9, "bodies.lower.joint_damping": 1e9}
-    held = run_world(limited_arm(**stiff), "ideal-friction")
-    assert np.abs(held.q).max() < 2e-3 and (np.diff(held.energy["friction_work"]) <= 0.0).all()
 
 
 def test_every_world_takes_the_hands_force_over_time() -> None:

@@ -181,7 +181,7 @@ def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, 
                for contacts in FRICTIONAL_CONTACTS for mu in FRICTIONS}
     makers |= {f"rod between walls, μ = {mu:g}": partial(_wedged_rod, mu) for mu in FRICTIONS}
     made = {name: attempt(name, given, failures) for name, given in makers.items()}
-    return tuple(StoredProblem(ImpactProblem.from_impact(*given, name=name), format="built here")
+    return tuple(StoredProblem(ImpactProblem.from_impact(*given, name=name))
                  for name, given in made.items() if given is not None)  # fmt: skip
 
 

@@ -6,8 +6,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from iapb.advice.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
 from iapb.compiled import block
@@ -158,9 +156,3 @@ def test_an_effect_that_is_off_would_change_no_bit(name: str) -> None:
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_gets_a_reason_for_every_effect(name: str) -> None:
     assert all(found.reason and "None" not in found.reason for found in decide_effects(load_scene(find_scene(name))))
-
-
-@given(st.sampled_from([("penalty_stiffness", "stiffness"), ("contact_damping", "damping"), ("friction", "friction"),
-                       ("clustering", "cluster_distance"), ("coherence", "coherence_distance")]), st.floats(0.0, 1e6))
-def test_a_number_of_the_contact_section_is_on_exactly_where_it_is_not_zero(one: tuple[str, str], value: float) -> None:
-    assert effect(PEG.with_values({f"contact.{one[1]}": value}), one[0]).active == (value > 0.0)

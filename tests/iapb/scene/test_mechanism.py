@@ -11,7 +11,7 @@ import pytest
 from iapb.contact.geometry import CIRCLE, HALF_PLANE, POLYGON
 from iapb.errors import SceneError
 from iapb.mechanics.mechanism import Mechanism
-from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.scene import Scene, load_scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
 
 # A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie free.
@@ -150,12 +150,3 @@ def test_unknown_links_and_bad_files_are_mistakes_of_the_scene(tmp_path: Path) -
     text = scene_with_robot(tmp_path, more=", position: {leg: [1]}")
     assert "robots[0].position of robot rob = 'leg'" in mistakes_of(text, file)
     assert "readable" in mistakes_of(scene_with_robot(tmp_path, "missing.urdf"), file)
-
-
-def test_neighbouring_links_of_the_arm_are_no_pairs() -> None:
-    scene = load_scene(find_scene("arm_obstacles"))
-    shapes = shapes_of(scene)
-    upper, forearm, tool = ([body.name for body in scene.bodies].index(f"arm_{name}")
-                            for name in ("upper_arm", "forearm", "tool"))
-    bodies = {frozenset(pair) for pair in shapes.body[pairs_of(scene, shapes)].tolist()}
-    assert {upper, tool} in bodies and {upper, forearm} not in bodies

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.run import Run
-from iapb.scene import Scene, find_scene, load_scene, scene_from_text, scene_names
+from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.scene.mechanism import mechanism_of, start_of
 from iapb.simulation import simulate
 from iapb.system import System
@@ -106,22 +106,3 @@ def test_links_of_the_arm_meet_obstacles_and_the_block() -> None:
     assert any("world" in pair and pair & arm for pair in met)
     assert any("block" in pair and pair & arm for pair in met)
     assert len(run.impacts.step) > 0 and run.impacts.energy_lost.min() > -1e-12 and np.isfinite(run.q).all()
-
-
-def test_a_scene_in_space_and_its_planar_twin_move_alike() -> None:
-    """A disc sliding off a floor and a ball without spin: the same numbers from both grammars."""
-    common = "rate: 1000\nduration: 0.3\ncontact: {stiffness: 500, damping: 2, restitution: 0.5}\n"
-    planar = scene_from_text(
-        "name: p\n" + common + "gravity: [0, -9.81]\nbodies:\n  - {name: b, joint: planar, mass: 0.1, inertia: 1e-5, "
-        "shapes: [{kind: circle, radius: 0.02}], position: [0, 0.1, 0], velocity: [0.2, 0, 0]}\n"
-        "walls:\n  - {name: w, kind: half_plane, point: [0, 0], normal: [0, 1]}\n"
-    )
-    spatial = scene_from_text(
-        "name: s\ndimensions: 3\n" + common + "gravity: [0, 0, -9.81]\nbodies:\n  - {name: b, joint: free_flyer, "
-        "mass: 0.1, inertia: [1e-5, 1e-5, 1e-5], shapes: [{kind: sphere, radius: 0.02}], "
-        "position: [0, 0, 0.1, 0, 0, 0, 1], velocity: [0.2, 0, 0, 0, 0, 0]}\n"
-        "walls:\n  - {name: w, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}\n"
-    )
-    flat, solid = simulate(planar), simulate(spatial)
-    assert len(flat.impacts.step) > 0
-    np.testing.assert_allclose(solid.q[:, [0, 2]], flat.q[:, :2], atol=1e-14)
