@@ -38,12 +38,6 @@ TOPICS: dict[str, str] = {
 }
 
 
-def compute_topic(name: str, runner: Runner, depth: str, progress: Progress) -> Finding:
-    """Compute one topic."""
-    topic: Finding = _topic(name)(runner, depth, progress)
-    return topic
-
-
 def _topic(name: str) -> Any:
     module, topic = TOPICS[name].split(":")
     return getattr(import_module(module), topic)
@@ -95,8 +89,9 @@ def checked_claims(
 
 def _plan(name: str) -> Plan:
     """Return the plan of a topic; it is timed if one of its checks has a column of times."""
-    timed = any(check.timed for check in getattr(_topic(name), "checks", ()))
-    return Plan(Finding, lambda runner, depth, progress, failures: compute_topic(name, runner, depth, progress), timed)
+    topic = _topic(name)
+    timed = any(check.timed for check in getattr(topic, "checks", ()))
+    return Plan(Finding, lambda runner, depth, progress, failures: topic(runner, depth, progress), timed)
 
 
 def plans() -> dict[str, Plan]:

@@ -8,17 +8,15 @@ from __future__ import annotations
 import os
 import resource
 import signal
-import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import h5py
 import pytest
 
 from iapb import find_scene, load_scene
@@ -27,8 +25,7 @@ from iapb.run import Run
 from reference.worlds import run_world
 from reports.store import RunStore, content_hash, read_run
 from reports.store.care import DAMAGED, WHOLE, check_store, collect_garbage, garbage
-from reports.store.io import mark_store, sealed
-from reports.store.schema import FORMAT_VERSION
+from reports.store.io import mark_store
 from tests.robustness.damage import Rng
 
 _FINISHED, _LONGEST = "finished", 0.25  # [s]: a dozen runs are stored in that time
@@ -152,51 +149,10 @@ def _collect_for_ever(folder: Path) -> None:
         collect_garbage(garbage(folder))
 
 
-def wrong_file(make: Callable[[bytes, Rng], bytes], folder: Path, rng: Rng) -> None:
-    """Put something else in the place of a run; reading must refuse it by name."""
-    path = put(folder)
-    path.write_bytes(make(path.read_bytes(), rng))
-    with pytest.raises((OSError, IapbError), match=path.name):
-        read_run(path)
-
-
-def _flipped(content: bytes, rng: Rng) -> bytes:
-    at = int(rng.integers(len(content)))
-    return content[:at] + bytes([content[at] ^ (1 << int(rng.integers(8)))]) + content[at + 1 :]
-
-
-def _with_version(version: int, content: bytes, rng: Rng) -> bytes:
-    return _changed(content, lambda file: file.attrs.__setitem__("format_version", version))
-
-
-def _somebody_elses(content: bytes, rng: Rng) -> bytes:
-    return _changed(content, lambda file: [file.pop(name) for name in list(file)] and file.attrs.clear())
-
-
-def _changed(content: bytes, change: Callable[[Any], Any]) -> bytes:
-    with tempfile.NamedTemporaryFile() as place:
-        Path(place.name).write_bytes(content)
-        with h5py.File(place.name, "r+") as file:
-            change(file)
-        return sealed(Path(place.name).read_bytes())
-
-
-_WRONG: dict[str, Callable[[bytes, Rng], bytes]] = {
-    "a damaged byte": _flipped,
-    "an empty file": lambda content, rng: b"",
-    "a table of text": lambda content, rng: b"time,x\n0,1\n",
-    "half of a run": lambda content, rng: content[: len(content) // 2],
-    "its first bytes": lambda content, rng: content[:8],
-    "a run with a tail": lambda content, rng: content + b"tail",
-    "an older format": partial(_with_version, FORMAT_VERSION - 1),
-    "a later format": partial(_with_version, FORMAT_VERSION + 1),
-    "somebody else's HDF5": _somebody_elses,
-}
 FAULTS: dict[str, Callable[[Path, Rng], None]] = {
     "kill -9 at a random moment": killed_writer,
     "the disk is full": full_disk,
     "two processes write one store": rival_writers,
     "a folder that cannot be written": forbidden_folder,
     "gc --delete without a pause": collecting_writers,
-    **{name: partial(wrong_file, make) for name, make in _WRONG.items()},
 }

@@ -26,25 +26,14 @@ import numpy as np
 from iapb import decide_effects, load_scene, simulate
 from iapb.errors import IapbError, RunFileError
 from iapb.mechanics.urdf import read_collisions, read_urdf
-from iapb.recording import Recorder
-from iapb.scene import find_scene, scene_folder
+from iapb.scene import scene_folder
 from iapb.scene.document import Document
-from iapb.simulation import Simulation
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import _write_rows, read_problem, write_fclib
-from reference.worlds import find_world
 from reports.cli import main
 from reports.commands.inspect import inspect
-from reports.live.deadline import TICK_COLUMNS
-from reports.live.replay import finish_live, is_live, open_parts
-from reports.resimulate import recover
-from reports.store.folder import Place
 from reports.store.io import sealed
-from reports.store.keys import content_hash
-from reports.store.parts import Parts
-from reports.store.runs import read_entry
 from reports.store.tables import read_table, write_table
-from reports.streaming import Stream, parts_head
 from reports.sweeps.study import load_study, points_of, scene_of
 from tests.robustness.damage import TOKENS, Rng, changes, chosen, damaged_bytes, damaged_text, damaged_values
 from tests.robustness.faults import put
@@ -235,74 +224,6 @@ _WRONG: tuple[Any, ...] = (
 )  # fmt: skip
 
 
-_CHUNK, _CHUNKS = 60, 4  # steps of a part of a killed run, and how many parts there are
-_KEY, _GO_ON = "fuzz", "run"
-
-
-@cache
-def _killed() -> tuple[dict[str, bytes], list[str], str]:
-    """Parts of a run, to read and to go on from, and of a live run; what the first ones, and what all, come to."""
-    hashes: list[str] = []
-    with tempfile.TemporaryDirectory() as folder:
-        simulation = _simulation()
-        recorder, total = Recorder(simulation), _CHUNK * _CHUNKS
-        head = parts_head(simulation, "IAPB", total, key=_KEY, code=_KEY)
-        writers = (Parts(Path(folder) / "run.h5.parts", head),
-                   open_parts(Path(folder), "live", simulation, "IAPB", total))  # fmt: skip
-        for _ in range(_CHUNKS):
-            recorder.chunk(recorder.steps + _CHUNK)
-            hashes.append(content_hash(recorder.run("IAPB", "killed")))
-            for parts, more in zip(writers, (None, np.zeros((_CHUNK, TICK_COLUMNS))), strict=True):
-                parts.write(recorder.records[-1], _CHUNK, 0.0, more, simulation.arrays())
-        run, live = (json.dumps([path.read_bytes().hex() for path in sorted(parts.folder.glob("*.part"))]).encode()
-                     for parts in writers)  # fmt: skip
-        for parts in writers:
-            parts.close()
-        return {"read": run, _GO_ON: run, "live": live}, hashes, content_hash(recorder.run("IAPB", ""))
-
-
-def _simulation() -> Simulation:
-    world, scene = find_world("IAPB"), load_scene(find_scene("peg_corner"))
-    return Simulation(scene, world.law, world.coupling_in(scene))
-
-
-def damaged_parts(sample: bytes, other: bytes, rng: Rng) -> bytes:
-    """Damage to the bytes of a part, more often to the first; or whole parts lost, doubled or put elsewhere."""
-    pieces = [bytes.fromhex(text) for text in json.loads(sample)]
-    at, to = (int(rng.integers(1, len(pieces))) for _ in range(2))
-    if rng.random() < 0.75:
-        at = 0 if rng.random() < 0.4 else at
-        line, newline, numbers = pieces[at].partition(b"\n")
-        whole = rng.random() < 0.5
-        pieces[at] = damaged_bytes(pieces[at], rng) if whole else damaged_bytes(line, rng) + newline + numbers
-    elif rng.random() < 0.5:
-        pieces[at] = bytes.fromhex(json.loads(other)[to])
-    else:
-        pieces.insert(to, pieces.pop(at))
-    return json.dumps([piece.hex() for piece in pieces]).encode()
-
-
-class WrongContent(Exception):
-    """Something else came of damaged parts than of the whole ones."""
-
-
-def _read_parts(path: Path) -> None:
-    """Go on to the end of a run; of a live run, and of another, make readable what there is."""
-    _, of_first, whole = _killed()
-    parts, target = path.with_name(f"{path.name}.h5.parts"), path.with_name(f"{path.name}.h5")
-    shutil.rmtree(parts, ignore_errors=True)
-    target.unlink(missing_ok=True)
-    parts.mkdir()
-    for number, text in enumerate(json.loads(path.read_bytes())):
-        (parts / f"{number:08d}.part").write_bytes(bytes.fromhex(text))
-    if path.name == _GO_ON:
-        Stream(Place(_KEY, target), _simulation(), "IAPB", _CHUNK * _CHUNKS).run(resume=True)
-        if read_entry(target).content_hash != whole:
-            raise WrongContent("the run that went on is another one")
-    elif read_entry(finish_live(parts, "killed")[0] if is_live(parts) else recover(parts)).content_hash not in of_first:
-        raise WrongContent("the steps are others than were recorded")
-
-
 _LINES = (
     "run peg_corner --set duration=0.05",
     "run two_discs --world PB --set duration=0.05 --set contact.restitution=0.5",
@@ -319,6 +240,8 @@ _WORDS = (
     "walls=[]", "bodies=[]", "couplings=~", "hand=", "bodies.9.mass=1", "contact..x=1", "name=..", "-1", "--impacts",
     "run.h5", "table.h5", "results", "", "contact.friction=0.3", "check", "gc",
 )  # fmt: skip
+
+
 class LineError(Exception):
     """A command line ended in a way that none may: another status, no message, a traceback in the text."""
 
@@ -368,6 +291,8 @@ def run_line(path: Path) -> None:
         raise LineError(f"{words}: ended with {status}: {complained}")
     if status:
         raise IapbError(complained)
+
+
 KINDS = {kind.name: kind for kind in (
     Kind("scenes", _shipped("*.yaml"), _as_values, _read_scene, 300),
     Kind("URDF robots", _shipped("robots/*.urdf"), _as_text, _read_robot),
@@ -376,6 +301,5 @@ KINDS = {kind.name: kind for kind in (
     Kind("FCLIB files", fclib_files, damaged_hdf5, read_problem),
     Kind("run files and tables", result_files, _as_bytes, _read_results),
     Kind("sealed run files", result_files, damaged_hdf5_sealed, _read_results, 60),
-    Kind("parts of killed runs", lambda: _killed()[0], damaged_parts, _read_parts, 60),
     Kind("command lines", lines, damaged_line, run_line, 60),
 )}  # fmt: skip

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import platform
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from iapb.run import Run
 from reports.provenance import collect_provenance
 from reports.store import content_hash, read_provenance, read_run, write_run
 from reports.store.io import sealed
+from reports.store.schema import FORMAT_VERSION
 
 MakeRun = Callable[..., Run]
 TURNED: dict[str, Any] = {
@@ -130,6 +133,14 @@ def test_behind_a_forged_seal_stand_other_checks(tmp_path: Path, make_run: MakeR
         read_run(path)
 
 
+def of_version(version: int, whole: bytes) -> bytes:
+    """The file as another version of iapb would have sealed it."""
+    stream = io.BytesIO(whole)
+    with h5py.File(stream, "r+") as file:
+        file.attrs["format_version"] = version
+    return sealed(stream.getvalue())
+
+
 def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(RunFileError, match="no such file"):
         read_run(tmp_path / "absent.h5")
@@ -150,3 +161,15 @@ def test_provenance_is_complete_and_names_no_machine(tmp_path: Path, make_run: M
     text = " ".join(facts.values())
     assert str(Path(__file__).parents[3]) not in text and str(Path.home()) not in text
     assert platform.node() == "" or platform.node() not in text.split()
+
+
+@pytest.mark.parametrize("wrong", [
+    lambda whole: b"", lambda whole: whole + b"tail", lambda whole: whole[:8], lambda whole: b"time,x\n0,1\n",
+    partial(of_version, FORMAT_VERSION - 1), partial(of_version, FORMAT_VERSION + 1)])
+def test_other_contents_and_versions_are_refused_by_name(
+    wrong: Callable[[bytes], bytes], tmp_path: Path, make_run: MakeRun
+) -> None:
+    path = write_run(tmp_path / "run.h5", make_run())
+    path.write_bytes(wrong(path.read_bytes()))
+    with pytest.raises(RunFileError, match=path.name):
+        read_run(path)

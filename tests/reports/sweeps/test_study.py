@@ -57,7 +57,8 @@ def test_a_range_has_its_ends_exactly_and_even_steps(start: float, stop: float, 
 
 
 @pytest.mark.parametrize(("old", "new", "said"), [
-    ("grid:", "grdi:", "grdi"), ("count: 3", "count: 0", "random.count"),
+    *((f"{name}:", f"{name}x:", f"{name}x") for name in ("values", "grid", "random", "count", "seed", "from", "to")),
+    ("count: 3", "count: 0", "random.count"),
     ("count: 3", f"count: {MAX_POINTS}", "at most"),
     ("[0, 1]", "{from: 0, to: 1, count: 3, scale: log}", "linear where an end is not positive"),
     ("{from: -0.1, to: 0.1}", "{from: 1, to: 0.1}", "at least 1"),
@@ -81,6 +82,8 @@ def test_studies_and_scenes_that_are_not_there_are_refused_by_name(tmp_path: Pat
         find_study("nothing")
     (tmp_path / "a.yaml").symlink_to("b.yaml")
     (tmp_path / "b.yaml").symlink_to("a.yaml")
-    for scene in ("9" * 1000 + ".yaml", "a.yaml"):
+    (tmp_path.with_name("outside")).write_text("")
+    (tmp_path / "link").symlink_to(tmp_path.with_name("outside"))
+    for scene in ("9" * 1000 + ".yaml", "a.yaml", "link", "../outside", "/etc/passwd", "a\0b"):
         with pytest.raises(ArgumentError, match="scene = "):
             scene_of(study_from_text(SMALL).model_copy(update={"scene": scene}), tmp_path / "study.yaml")
