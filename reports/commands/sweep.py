@@ -33,13 +33,13 @@ def sweep(
     with stage_progress() as progress:
         outcome = run_sweep(chosen, str(scene_of(chosen, path)), out, who,
                             partial(progress, f"points of {chosen.name}"))
-    made, failed = len(outcome.results) - outcome.reused, outcome.failed
+    made, failed = len(outcome.points) - outcome.reused, outcome.failed
     table, runs = out / chosen.name / SUMMARY, out / chosen.name / "runs"
-    facts = {"study": chosen.name, "points": outcome.results, "computed": made, "found": outcome.reused,
+    facts = {"study": chosen.name, "points": outcome.points, "computed": made, "found": outcome.reused,
              "failed": len(failed), "content_hash": outcome.content_hash, "table": table, "runs": runs}  # fmt: skip
-    notes = Counter(result.note for result in failed).most_common(5)
+    notes = Counter(point["note"] for point in failed).most_common(5)
     return Answer(facts, [
-        f"{chosen.name}: {len(outcome.results)} points, {made} computed now, {outcome.reused} found.",
+        f"{chosen.name}: {len(outcome.points)} points, {made} computed now, {outcome.reused} found.",
         *(f"  {count} without a run: {note}" for note, count in notes),
         f"All results together: {outcome.content_hash[:16]}",
         f"Table in {table}, runs in {runs}",

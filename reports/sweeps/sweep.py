@@ -28,7 +28,7 @@ from reports.store.folder import RunStore
 from reports.store.io import mark_store
 from reports.store.keys import code_version
 from reports.store.tables import write_table
-from reports.sweeps.study import Point, Study, points_of
+from reports.sweeps.study import LAW, Point, Study, points_of
 from verification.table import table_from
 
 DONE, FAILED = "done", "failed"
@@ -38,41 +38,23 @@ _MEASURES = ("impacts", "energy_lost [J]", "penetration [m]", "kinetic_energy [J
 
 
 @dataclass(frozen=True)
-class Result:
-    """The result of one point; for a failed point the measures are None, and `note` is the reason."""
-
-    index: int
-    status: str
-    reused: bool = False  # the run file was there
-    file: str = ""
-    content_hash: str = ""
-    note: str = ""
-    impacts: int | None = None
-    energy_lost: float | None = None  # in impacts [J]
-    penetration: float | None = None  # deepest [m]
-    kinetic_energy: float | None = None  # at the end [J]
-
-
-@dataclass(frozen=True)
 class SweepOutcome:
     """A finished sweep.
 
-    results : by index of the point; content_hash : hash of all results
+    points : by index, the row of each in the table: its values, and what was measured; None if it failed, and `note`
+        is the reason
+    reused : number of points that were finished before; content_hash : hash of all results
     """
 
     folder: Path
-    results: tuple[Result, ...]
+    points: tuple[dict[str, Any], ...]
+    reused: int
     content_hash: str
 
     @property
-    def reused(self) -> int:
-        """Return the number of points that were finished before."""
-        return sum(result.reused for result in self.results)
-
-    @property
-    def failed(self) -> tuple[Result, ...]:
-        """Return the failed points, each with its reason."""
-        return tuple(result for result in self.results if result.status == FAILED)
+    def failed(self) -> tuple[dict[str, Any], ...]:
+        """Return the failed points."""
+        return tuple(point for point in self.points if point["status"] == FAILED)
 
 
 def run_sweep(
@@ -92,31 +74,22 @@ def run_sweep(
     folder = Path(out).resolve() / study.name
     mark_store(folder)
     RunStore(folder / RUNS)  # makes the folder
-    points, results = list(points_of(study, str(Path(scene).resolve()))), dict[int, Result]()
+    points, results = list(points_of(study, str(Path(scene).resolve()))), dict[int, tuple[dict[str, Any], bool]]()
     compute = partial(compute_point, folder=str(folder / RUNS), code=code_version())
     with closing(scheduler(compute, points)) as finished:
         for point, result in finished:
             results[point.index] = result
             if progress is not None:
                 progress(len(results), len(points))
-    ordered = tuple(results[point.index] for point in points)
-    _write_summary(folder / SUMMARY, study, points, ordered)
-    hashed = "".join(f"{result.index} {result.status} {result.content_hash}\n" for result in ordered)
-    return SweepOutcome(folder, ordered, hashlib.sha256(hashed.encode()).hexdigest())
+    rows = tuple(results[point.index][0] for point in points)
+    write_table(folder / SUMMARY, study.name, table_from(rows), title=study.title or study.name, command="iapb sweep")
+    hashed = "".join(f"{row['point']} {row['status']} {row['content_hash']}\n" for row in rows)
+    return SweepOutcome(folder, rows, sum(reused for _, reused in results.values()),
+                        hashlib.sha256(hashed.encode()).hexdigest())
 
 
-def _write_summary(path: Path, study: Study, points: list[Point], results: tuple[Result, ...]) -> None:
-    """Write a table with a row per point: the changed values, the results, and the run file."""
-    rows = []
-    for point, result in zip(points, results, strict=True):
-        law = {f"law.{name}": value for name, value in point.law.items()}
-        measured = {title: getattr(result, title.partition(" [")[0]) for title in _MEASURES}
-        rows.append({"point": point.index, "world": point.world} | point.values | law | measured)
-    write_table(path, study.name, table_from(rows), title=study.title or study.name, command="iapb sweep")
-
-
-def compute_point(point: Point, folder: str, code: str) -> Result:
-    """Compute a point, or read its run if it exists.
+def compute_point(point: Point, folder: str, code: str) -> tuple[dict[str, Any], bool]:
+    """Compute a point, or read its run if it exists; return its row in the table, and whether its run was there.
 
     Raises
     ------
@@ -127,6 +100,8 @@ def compute_point(point: Point, folder: str, code: str) -> Result:
         raise IapbError("a worker runs another version of iapb: install the same one on every machine")
     if not Path(folder).is_dir():
         raise IapbError(f"a worker does not see the folder {folder}: the machines of a cluster must share it")
+    row = {"point": point.index, "world": point.world} | point.values
+    row |= {f"{LAW}{name}": value for name, value in point.law.items()}
     try:
         scene = _scene(point.scene).with_values(point.values)
         world = find_world(point.world, point.rendering)
@@ -138,11 +113,13 @@ def compute_point(point: Point, folder: str, code: str) -> Result:
             run, entry = _store(Path(folder)).fetch(
                 place, lambda: require_complete(simulate(scene, law, coupling, world=point.world)))
     except IapbError as error:
-        return Result(point.index, FAILED, note=" ".join(str(error).split()))
+        note = " ".join(str(error).split())
+        return row | dict.fromkeys(_MEASURES) | {"status": FAILED, "note": note, "file": "", "content_hash": ""}, False
     energy = run.energy.get("kinetic")
-    return Result(point.index, DONE, reused, entry.file, entry.content_hash, "", len(run.impacts.step),
-                  float(np.sum(run.impacts.energy_lost)), max(0.0, -float(run.contacts.gap.min(initial=0.0))),
-                  None if energy is None else float(energy[-1]))
+    measured = (len(run.impacts.step), float(np.sum(run.impacts.energy_lost)),
+                max(0.0, -float(run.contacts.gap.min(initial=0.0))), None if energy is None else float(energy[-1]),
+                DONE, "", entry.file, entry.content_hash)  # fmt: skip
+    return row | dict(zip(_MEASURES, measured, strict=True)), reused
 
 
 @cache

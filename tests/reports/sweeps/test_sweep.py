@@ -7,8 +7,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +17,7 @@ from iapb.errors import ArgumentError, IapbError
 from reports.batches import cluster, here, processes
 from reports.store import read_table
 from reports.sweeps.study import Point, points_of, study_from_text
-from reports.sweeps.sweep import FAILED, RUNS, SUMMARY, Result, SweepOutcome, compute_point, run_sweep
+from reports.sweeps.sweep import FAILED, RUNS, SUMMARY, SweepOutcome, compute_point, run_sweep
 from tests.reports.sweeps.test_study import SMALL
 
 SCENE, STUDY = str(find_scene("two_discs")), study_from_text(SMALL)
@@ -32,7 +32,7 @@ class Stopped(Exception):
     """Stands for whatever ends a process."""
 
 
-def dying(compute: Callable[[Point], Result], points: Iterable[Point]) -> Iterator[tuple[Point, Result]]:
+def dying(compute: Callable[[Point], Any], points: Iterable[Point]) -> Iterator[tuple[Point, Any]]:
     """Compute backwards, and die after four points."""
     for done, found in enumerate(here(compute, reversed(list(points)))):
         if done == 4:
@@ -51,17 +51,17 @@ def test_a_sweep_that_was_stopped_goes_on_and_a_finished_one_computes_nothing(
     monkeypatch.setattr("reports.sweeps.sweep.simulate", lambda *_, **__: pytest.fail("simulated again"))
     again = run_sweep(STUDY, SCENE, tmp_path)
     assert (again.reused, again.content_hash) == (6, undisturbed.content_hash)
-    assert [replace(result, reused=False) for result in again.results] == list(undisturbed.results)
+    assert again.points == undisturbed.points
 
 
 def test_a_lost_file_is_computed_again_and_a_damaged_one_is_told(tmp_path: Path) -> None:
     first = run_sweep(STUDY, SCENE, tmp_path)
-    lost, damaged = (first.folder / RUNS / result.file for result in first.results[:2])
+    lost, damaged = (first.folder / RUNS / point["file"] for point in first.points[:2])
     lost.unlink()
     content = damaged.read_bytes()
     damaged.write_bytes(content[:-100])
     outcome = run_sweep(STUDY, SCENE, tmp_path)
-    assert outcome.reused == 4 and [damaged.name in result.note for result in outcome.failed] == [True]
+    assert outcome.reused == 4 and [damaged.name in point["note"] for point in outcome.failed] == [True]
     damaged.write_bytes(content)
     assert run_sweep(STUDY, SCENE, tmp_path).content_hash == first.content_hash
 
@@ -112,12 +112,12 @@ def test_a_worker_of_another_version_does_not_take_part(tmp_path: Path) -> None:
 def test_a_point_that_cannot_be_run_is_told_and_the_others_are_done(tmp_path: Path) -> None:
     wrong = STUDY.model_copy(update={"grid": {"law.integrator": ("midpoint", "euler")}})
     outcome = run_sweep(wrong, SCENE, tmp_path)
-    assert [result.status == FAILED for result in outcome.results] == [False] * 3 + [True] * 3
-    assert "one of momentum, semi_implicit_euler" in outcome.failed[0].note
+    assert [point["status"] == FAILED for point in outcome.points] == [False] * 3 + [True] * 3
+    assert "one of momentum, semi_implicit_euler" in outcome.failed[0]["note"]
 
 
 def test_the_table_has_a_row_for_each_point(undisturbed: SweepOutcome) -> None:
     table = read_table(undisturbed.folder / SUMMARY, "small")
-    assert table["file"] == [result.file for result in undisturbed.results]
+    assert table["file"] == [point["file"] for point in undisturbed.points]
     assert table["contact.restitution"] == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
     assert table["energy_lost"][0] > 0.0 >= table["energy_lost"][-1] - 1e-12
