@@ -46,7 +46,7 @@ print(json.dumps({"passed": bool(passed), "verdict": time.perf_counter() - start
 def main() -> int:
     """Build, test each environment and print a table; return 1 if one fails or gives different numbers."""
     parser = argparse.ArgumentParser(prog="python -m tools.packages", description=__doc__.splitlines()[0])
-    parser.add_argument("--extra", default="", help="an extra of pyproject.toml to install, too: verify, report or all")
+    parser.add_argument("--extra", default="", help="an extra of pyproject.toml to install, too")
     parser.add_argument("--pythons", nargs="+", metavar="COMMAND", default=[
         path for path in (shutil.which(f"python{version}") for version in PYTHONS) if path],
         help="Python commands to try; those of 3.11 to 3.13 that are found")  # fmt: skip
@@ -55,8 +55,8 @@ def main() -> int:
         parser.error("none of python3.11, python3.12, python3.13 is found: name some by --pythons")
     with tempfile.TemporaryDirectory() as folder:
         wheel, sdist = build(Path(folder))
-        first = chosen.pythons[0]
-        wanted = [(python, wheel, False) for python in chosen.pythons] + [(first, sdist, False), (first, wheel, True)]
+        wanted = [(python, wheel, False) for python in chosen.pythons]
+        wanted += [(chosen.pythons[0], sdist, False), (chosen.pythons[0], wheel, True)]
         rows = [try_one(Path(folder) / f"env{number}", *one, chosen.extra) for number, one in enumerate(wanted)]
     for row in rows:
         print(", ".join(f"{name} {value:.1f}" if isinstance(value, float) else f"{name} {value}"
@@ -69,10 +69,10 @@ def main() -> int:
 
 def build(folder: Path) -> tuple[Path, Path]:
     """Build the wheel and the sdist; return their paths."""
-    subprocess.run([sys.executable, "-m", "venv", folder / "build"], check=True)
+    told([sys.executable, "-m", "venv", folder / "build"])
     python = folder / "build/bin/python"
-    subprocess.run([python, "-m", "pip", "install", "-q", "build"], check=True)
-    subprocess.run([python, "-m", "build", "--outdir", folder / "dist", ROOT], check=True, stdout=subprocess.DEVNULL)
+    told([python, "-m", "pip", "install", "-q", "build"])
+    told([python, "-m", "build", "--outdir", folder / "dist", ROOT])
     return next((folder / "dist").glob("*.whl")), next((folder / "dist").glob("*.tar.gz"))
 
 
