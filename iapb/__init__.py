@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from iapb.scene import scene_folder as scene_folder
     from iapb.simulation import Simulation as Simulation
     from iapb.simulation import simulate as simulate
+    from verification import check_passivity as check_passivity
 
     __version__: str
 
@@ -54,6 +55,7 @@ _HOME = {
     "iapb.run": ("Run",),
     "iapb.scene": ("Scene", "find_scene", "load_scene", "scene_folder"),
     "iapb.simulation": ("Simulation", "simulate"),
+    "verification": ("check_passivity",),  # of an upper package, for users; the engine itself never imports one
 }
 
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

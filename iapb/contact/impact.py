@@ -56,7 +56,8 @@ class Impact(NamedTuple):
         returned v⁺. With the clamp on, the upper bound is never above 0.
     clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 = inactive.
     status : ``"complete"``; ``"budget"``: the row budget stopped the method early; ``"not solved"``: a contact still
-        closes after Poisson's law, which nearly opposed rows can cause (the energy does not rise in this case either);
+        closes after Poisson's law by more than 1e-6 of the largest |J v⁻|, which nearly opposed rows and κ(M) from
+        1e10 can cause (the energy does not rise in this case either);
         ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be none). p_t then maximizes the
         dissipation within the friction limits of the frictionless impact. It stays in the friction cones, and
         passivity and restitution still hold.
@@ -123,6 +124,8 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
         Wrong shape, NaN or infinity, M not symmetric positive definite, e outside its range.
     RangeError
         The result would overflow.
+    SolverError
+        The active-set method of Poisson's law did not converge: rows are nearly opposed.
 
     Notes
     -----

@@ -89,7 +89,7 @@ def radius_margins(d: int) -> tuple[Fraction, ...]:
     wanted = error(total, b, g, f) + left + row_error * (1 + u)
     low = ((total * u * grown + b + f) * n + total * (u + g)) * grown
     kept, share = 1 - (2 * n + 5) * u, 2 * (n + 6) ** 2 * u * u
-    underflow = kept * 16 * n - share * n
+    underflow = kept * 2**54 * n - share * n
     returned = (row * kept * share + each * underflow + eta * (underflow - 2)) * (1 - u)
     return tuple(returned * (1 - u) - wanted - low * u)
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.contact_set import (
-    HOLDS,
     LEFT,
     STRIKES,
     add_supports,
@@ -17,7 +16,7 @@ from iapb.contact.kernels.contact_set import (
 from iapb.contact.kernels.impact import factored_impact, rank_tolerance, whiten_impact
 from iapb.contact.kernels.impact_friction import add_impact_friction
 from iapb.contact.kernels.joint_stops import is_stop
-from iapb.contact.kernels.passive import passive_step, plainly_loses, write_step
+from iapb.contact.kernels.passive import passive_step, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
 from iapb.contact.kernels.rows import body_row, contact_velocities, direction_row, friction_of, tangent_of
 from iapb.contact.kernels.shape_frames import copy_contact
@@ -99,7 +98,7 @@ def apply_group(world, state, size, share):
     certain = share == 1.0  # the velocity that the resolver has accepted
     for i in range(size):
         certain = certain and after[i] == work.v_plus[i]
-    if not certain and not plainly_loses(work.mass, v, after):
+    if not certain:
         share = passive_step(work.mass, v, change, share, after)
     lost = 0.0
     for i in range(size):
@@ -123,7 +122,7 @@ def resolve_unequal(world, state, size, count, smallest, tolerance):
 
 
 @kernel(needs="impact_friction", otherwise=(1.0, 1.0, True))
-def add_friction_to_impact(world, state, size, count, rank):
+def add_friction_to_impact(world, state, size, count, rank, only_push):
     """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
     contacts, f = state.contacts, state.friction_work
     tangents = f.velocity.shape[0]
@@ -135,7 +134,7 @@ def add_friction_to_impact(world, state, size, count, rank):
             direction_row(world.mechanism, state.body, contacts, i, tangent, state.row)
             for k in range(size):
                 f.rows[r * tangents + a, k] = state.row[state.dofs[k]]
-    return add_impact_friction(size, count, rank, state.work, state.push_work, f, state.row_impulse)
+    return add_impact_friction(size, count, rank, state.work, state.push_work, f, only_push, state.row_impulse)
 
 
 @kernel
@@ -144,12 +143,11 @@ def resolve_rows(world, state, size, count):
     work, contacts, e, unequal, solved, friction_share = state.work, state.contacts, world.restitution, False, True, 1.0
     tolerance = rank_tolerance(work.lower[:size, :size])
     if world.switches.unequal_restitution or world.switches.pushing or world.implicit:
-        e, largest, unequal = 1.0, 0.0, world.switches.pushing
+        e, largest, unequal = 1.0, 0.0, world.switches.pushing or world.implicit and count > 1
         for r in range(count):
             i = state.rows[r]
             own = pair_restitution(world, contacts, i)
             state.row_restitution[r], e, largest = own, min(e, own), max(largest, own)
-            unequal = unequal or contacts.mark[i] == HOLDS
         unequal = unequal or e < largest
     whiten_impact(size, count, work)
     if unequal:
@@ -161,7 +159,7 @@ def resolve_rows(world, state, size, count):
         span = rank
         if unequal and solved:  # Poisson's law needs no basis of the rows, friction does
             span = orthonormal_basis(size, count, tolerance, size, work)
-        friction_share, factor, met = add_friction_to_impact(world, state, size, count, span)
+        friction_share, factor, met = add_friction_to_impact(world, state, size, count, span, unequal and solved)
         clamp, solved = clamp * factor, solved and met
     elif not (unequal and solved):
         minimum_norm_impulses(size, count, rank, work.length, work.change[:size], state.row_impulse, work)

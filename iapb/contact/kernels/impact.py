@@ -6,7 +6,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.passive import UNIT, clamped_step, plainly_loses, write_step
+from iapb.contact.kernels.passive import UNIT, passive_step, write_step
 from iapb.contact.kernels.projector import orthonormal_basis
 from iapb.double_double import add_product, symmetric_entry
 from iapb.linalg import add_multiple, dot_of, from_whitened, to_momentum, to_whitened, whiten_columns
@@ -103,12 +103,11 @@ def apply_change(d, clamped, work):
 
     With the clamp, v⁺ has no more kinetic energy than v in real arithmetic; α = 0 if no other α is found.
     """
-    v, v_change, v_plus, alpha, moved = work.v[:d], work.v_change[:d], work.v_plus[:d], 1.0, False
-    for k in range(d):
-        moved = moved or v_change[k] != 0.0
-    write_step(v, v_change, alpha, v_plus)
-    if clamped and moved and not plainly_loses(work.mass, v, v_plus):
-        alpha = clamped_step(work.mass, v, v_change, v_plus, work.deviation, work.along, work.shifted)
+    v, v_change, v_plus, alpha = work.v[:d], work.v_change[:d], work.v_plus[:d], 1.0
+    if clamped:
+        alpha = passive_step(work.mass, v, v_change, alpha, v_plus)
+    else:
+        write_step(v, v_change, alpha, v_plus)
     for k in range(d):
         work.change[k] *= alpha
     to_momentum(work.lower, work.change[:d], work.momentum)

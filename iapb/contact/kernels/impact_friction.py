@@ -55,12 +55,13 @@ class FrictionWork(NamedTuple):
 
 
 @kernel
-def add_impact_friction(d, count, rank, work, push, f, impulses):
+def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     """Add Coulomb friction to the normal impact in `work`; `f.rows` holds the tangents' rows of J, `f.coefficient` μ.
 
     Writes v⁺, the generalized impulse, the normal impulses (count,) and the tangential ones, `f.p`; returns (share of
     friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, also before convergence. The share is α
     times a factor that keeps p_t within the friction cones if no p_t obeys Coulomb's law.
+    only_push : whether contacts only push; `impulses` then holds the normal impulses of Poisson's law.
     """
     p, u, change, moved = f.p[: count * f.velocity.shape[0]], work.u[:d], work.change[:d], f.moved[:d]
     lower, largest = work.lower, 0.0
@@ -74,7 +75,7 @@ def add_impact_friction(d, count, rank, work, push, f, impulses):
         if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
     scale = math.sqrt(largest) * math.sqrt(dot_of(u, u))  # of the rounding of a tangential velocity [m/s]
-    met = settle_friction(count, rank, work, push, f, d, scale)
+    met = settle_friction(count, rank, work, push, f, d, scale, only_push, impulses)
     share = share_within_cone(count, f)
     combine(count, f)
     for k in range(d):
@@ -146,10 +147,11 @@ TRIMS = 5  # each removes the excess over the cones and leaves a share of μ of 
 
 
 @kernel
-def settle_friction(count, rank, work, push, f, d, scale):
+def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
     """Write p_t of Coulomb's law and the normal impulses without and with it; return whether the law is met within MET.
 
-    If it is not, p_t maximizes the dissipation under the limits of the frictionless impact, a convex problem.
+    If it is not, p_t maximizes the dissipation under the limits of the frictionless impact, a convex problem. Contacts
+    that only push get no limits from impulses that pull: these brace one another, and friction would stop anything.
     scale : speed [m/s] to which STILL and MET are relative.
     """
     size = f.velocity.shape[0]
@@ -163,15 +165,16 @@ def settle_friction(count, rank, work, push, f, d, scale):
     f.p[: count * size] = 0.0
     _move_normals(count, rank, work, f, False)
     for i in range(count):
-        f.without[i], f.limit[i] = f.wanted[i], 0.0
+        f.without[i] = f.wanted[i] = impulses[i] if only_push else f.wanted[i]
+        f.limit[i] = 0.0
         f.sliding[i] = f.coefficient[i] if f.without[i] > 0.0 else 0.0  # contacts that pull get no friction
-    if _settle(count, rank, work, f, d, scale, False):
+    if not only_push and _settle(count, rank, work, f, d, scale, False):
         _trim(count, rank, work, f, False)
         return True
     for i in range(count):
         f.limit[i] = f.sliding[i] * max(f.without[i], 0.0)
     friction_sweeps(count, f, HELD_SWEEPS, STILL * scale, True)
-    _move_normals(count, rank, work, f, False)
+    _move_normals(count, rank, work, f, only_push)
     return False
 
 

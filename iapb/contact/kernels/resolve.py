@@ -28,8 +28,8 @@ SYMMETRY_TOLERANCE = 1e-9
 LARGEST_ENTRY = 2.0  # of the scaled M: |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds where M is positive definite
 _LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
 _EXACT = 1000  # largest difference of binary exponents from the largest entry that still scales exactly
-# Where a contact still closes faster than this share of ‖Aᵢ‖ |u|, or the energy clamp takes more than this, the two
-# LCPs of Poisson's law were not solved. Rounding leaves 1e-13; nearly dependent rows that push against each other more.
+# Where a contact still closes faster than this share of the largest |J v⁻|, or the energy clamp takes more than this,
+# the two LCPs of Poisson's law were not solved. Rounding leaves 1e-13 √κ(M); rows that push against each other more.
 _UNSOLVED = 1e-6
 
 # How an impact ends; the last two have no result.
@@ -82,7 +82,7 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
             if rank < 0:
                 out.numbers[m, 1] = NOT_CONVERGED
                 return m
-            status = COMPLETE if clamp >= 1.0 - _UNSOLVED and separates(d, c, impact) else NOT_SOLVED
+            status = COMPLETE if clamp >= 1.0 - _UNSOLVED else NOT_SOLVED
         else:
             least = tolerance if tolerance > 0.0 else rank_tolerance(impact.lower)
             rank, clamp = factored_impact(d, c, restitution[m], least, budget, clamped, impact)
@@ -95,7 +95,7 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
                     for i in range(d):
                         f.rows[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
                 copy_into(f.coefficient[:c], friction[m])
-                share, factor, met = add_impact_friction(d, c, rank, impact, work.push, f, p)
+                share, factor, met = add_impact_friction(d, c, rank, impact, work.push, f, False, p)
                 clamp *= factor
                 status = COMPLETE if met else REDUCED
                 copy_into(p_t, f.p)
@@ -103,6 +103,8 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
         if not (all_finite(v_plus) and all_finite(momentum) and all_finite(p) and all_finite(p_t)
                 and math.isfinite(out.numbers[m, 2])):
             return m
+        if unequal is not None and not separates(jacobians[m], velocities[m], v_plus):
+            status = NOT_SOLVED
         out.numbers[m, 0], out.numbers[m, 1] = rank, CANCELLED if clamp == 0.0 or rounded and c > 0 else status
         out.numbers[m, 5], out.numbers[m, 6] = clamp, share
     return n
@@ -156,16 +158,12 @@ def _exponent(value):
 
 
 @kernel
-def separates(d, count, impact):
-    """Whether no contact closes after Poisson's law, to rounding."""
-    limit = -_UNSOLVED * math.sqrt(dot_of(impact.u[:d], impact.u[:d]))
-    for i in range(count):
-        speed = 0.0
-        for k in range(d):
-            speed += impact.rows[k, i] * (impact.u[k] + impact.change[k])
-        if speed < limit:
-            return False
-    return True
+def separates(jacobian, v, v_plus):
+    """Whether no contact closes after Poisson's law, by more than _UNSOLVED of the largest contact velocity before."""
+    largest, least = 0.0, 0.0
+    for i in range(jacobian.shape[0]):
+        largest, least = max(largest, abs(dot_of(jacobian[i], v))), min(least, dot_of(jacobian[i], v_plus))
+    return least >= -_UNSOLVED * largest
 
 
 @kernel

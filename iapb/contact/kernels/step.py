@@ -16,6 +16,7 @@ from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities
+from iapb.contact.kernels.seams import leave_out_seams
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.linalg import (
     add,
@@ -122,6 +123,8 @@ def find_contacts(world, state):
     state.contact_impulse[:count] = 0.0
     contact_velocities(world.mechanism, state.body, state.v, now, count)
     mark_new(now, count, before, state.contact_count[1], world.coherence_distance)
+    if world.implicit:
+        count = state.contact_count[0] = leave_out_seams(world, state, count)
     classify(world, state, count)
     return count
 

@@ -65,6 +65,36 @@ def exact_change(M: Floats, v: Floats, w: Floats) -> Fraction:
     return sum((Fraction(float(m)) * (b[i] * b[j] - a[i] * a[j]) for (i, j), m in np.ndenumerate(M)), Fraction(0)) / 2
 
 
+def ill_conditioned(kappa: float, count: int) -> list[Arrays]:
+    """M with eigenvalues from 1 to κ in random directions, random rows and velocities."""
+    rng, found = np.random.default_rng(round(kappa)), []
+    for _ in range(count):
+        d = int(rng.integers(2, 9))
+        turn, _ = np.linalg.qr(rng.normal(size=(d, d)))
+        mass = turn * np.append(kappa ** rng.uniform(0.0, 1.0, d - 1), kappa) @ turn.T
+        found.append((0.5 * (mass + mass.T), rng.normal(size=(int(rng.integers(1, d + 1)), d)), rng.normal(size=d)))
+    return found
+
+
+@pytest.mark.parametrize("kappa", [1e4, 1e8, 1e12])
+def test_exact_passivity_costs_no_restitution(kappa: float) -> None:
+    """Relative to the contacts' own speed. Impacts that are shortened until they gain nothing miss by up to 2e-3."""
+    for M, J, v in ill_conditioned(kappa, 100):
+        found, approach = resolve_impact(M, J, v, 1.0), J @ v
+        assert np.abs(J @ found.velocity + approach).max() <= 1e-10 * np.abs(approach).max()
+        assert exact_change(M, v, found.velocity) <= 0
+
+
+@pytest.mark.parametrize("kappa", [1e8, 1e12])
+def test_poissons_law_is_complete_only_if_no_contact_closes(kappa: float) -> None:
+    found = []
+    for M, J, v in ill_conditioned(kappa, 300):
+        impact = resolve_impact(M, J, v, np.linspace(0.0, 1.0, len(J)), method="poisson")
+        found.append((impact.status, -(J @ impact.velocity).min() <= 1e-6 * np.abs(J @ v).max()))
+    assert ("complete", False) not in found and ("complete", True) in found
+    assert kappa < 1e10 or ("not solved", False) in found
+
+
 @pytest.mark.parametrize("seed", range(30))
 @pytest.mark.parametrize("clamp", [True, False])
 @pytest.mark.parametrize("decades", [0.3, 4.0, 40.0])

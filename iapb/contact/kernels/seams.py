@@ -1,0 +1,68 @@
+"""Seams: contacts that a rigid body would not have, since only its sag reaches them.
+
+A body that slides from one flush wall to the next overlaps the second one by its sag. The narrow phase then finds the
+side or the corner of this wall, and an impact there would stop the body.
+"""
+
+from __future__ import annotations
+
+from iapb.compiled import kernel
+from iapb.contact.kernels.joint_stops import is_stop
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.shape_frames import copy_contact
+from iapb.linalg import add, dot, load, scale, store
+
+_OVERLAPS = 1e-9  # [m] what must be left without the sag; above the rounding of positions, below a sag that matters
+_SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body, too
+
+
+@kernel(needs="supports", otherwise=0)
+def leave_out_seams(world, state, count):
+    """Drop new contacts of pairs that the sag of a resting contact explains; return how many contacts stay."""
+    contacts, kept, i = state.contacts, 0, 0
+    while i < count:
+        stop, strikes, old = i, False, False
+        while (stop < count and contacts.shape_a[stop] == contacts.shape_a[i]
+                and contacts.shape_b[stop] == contacts.shape_b[i]):
+            strikes = strikes or contacts.normal_velocity[stop] < -world.approach_velocity
+            old = old or not contacts.is_new[stop]
+            stop += 1
+        if not strikes or old or is_stop(contacts, i) or not explained(world, state, i, count):
+            for k in range(i, stop):
+                if kept < k:
+                    copy_contact(contacts, kept, contacts, k)
+                    contacts.is_new[kept] = contacts.is_new[k]
+                    contacts.normal_velocity[kept] = contacts.normal_velocity[k]
+                    store(contacts.tangential_velocity, kept, load(contacts.tangential_velocity, k))
+                kept += 1
+        i = stop
+    return kept
+
+
+@kernel
+def explained(world, state, i, count):
+    """Whether the pair of contact i does not overlap once one of its bodies is lifted out of a resting contact."""
+    contacts, n = state.contacts, load(state.contacts.normal, i)
+    for j in range(count):
+        normal = load(contacts.normal, j)
+        if contacts.is_new[j] or is_stop(contacts, j) or dot(n, normal) > _SAME_NORMAL:
+            continue
+        for body, sign in ((contacts.body_a[j], 1.0), (contacts.body_b[j], -1.0)):
+            if body >= 0 and (body == contacts.body_a[i] or body == contacts.body_b[i]):
+                here = load(state.body.position, body)
+                store(state.body.position, body, add(here, scale(-sign * contacts.gap[j], normal)))
+                apart = is_apart(world, state, contacts.shape_a[i], contacts.shape_b[i])
+                store(state.body.position, body, here)
+                if apart:
+                    return True
+    return False
+
+
+@kernel
+def is_apart(world, state, a, b):
+    """Whether a pair of shapes does not overlap."""
+    for k in range(world.pairs.shape[0]):
+        if world.pairs[k, 0] == a and world.pairs[k, 1] == b:
+            return detect(world.shapes, world.pairs[k : k + 1], state.body.rotation, state.body.position, -_OVERLAPS,
+                          state.stage_contacts) == 0
+    return False
