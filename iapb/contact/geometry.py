@@ -68,6 +68,7 @@ class ContactBuffer(NamedTuple):
     normal_force: Annotated[Floats, "contact"]  # [N] on a along the normal
     friction_force: Annotated[Floats, "contact 3"]  # [N] on a
     mark: Annotated[States, "contact"]  # scratch of the clustering
+    expected: Annotated[Floats, "contact"]  # [m] gap after the step if it were linear
 
 
 class Shape(NamedTuple):

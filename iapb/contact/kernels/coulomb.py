@@ -38,6 +38,7 @@ class RestWork(NamedTuple):
     speed: Annotated[Floats, "row"]  # J v [m/s]; for friction alone that without friction
     p: Annotated[Floats, "row"]  # impulses of the step [N s]
     limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
+    bend: Annotated[Floats, "contact"]  # what the gap closed or opened more than Δt J v in the step before, by Δt [m/s]
     # Of friction alone
     block: Annotated[Floats, "contact 3"]  # entries xx, xy, yy of the contact's own block of J M⁻¹ Jᵀ [1/kg]
     inertia: Annotated[Floats, "contact"]  # its largest eigenvalue

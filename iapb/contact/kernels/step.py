@@ -113,7 +113,7 @@ def find_contacts(world, state):
     now, before = state.contacts, state.previous
     for i in range(state.contact_count[0]):  # `mark_new` and friction compare with those of the last step
         copy_contact(before, i, now, i)
-        before.normal_force[i] = now.normal_force[i]
+        before.normal_force[i], before.expected[i] = now.normal_force[i], now.expected[i]
         store(before.friction_force, i, load(now.friction_force, i))
     state.contact_count[1] = state.contact_count[0]
     count = present_contacts(world, state, now)
