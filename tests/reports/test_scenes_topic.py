@@ -65,7 +65,7 @@ def test_strips_show_every_joule(topic: Finding) -> None:
     impacts = topic.tables["contact"].column("impacts")
     for strip, found, struck in zip(strips, topic.tables["energy ledger"].records(), impacts, strict=True):
         gap = strip.layers.sum(axis=0)[-1] - strip.line[-1]
-        left_open = sum(found[f"residual: {name}"] for name in ("motion", "springs", "curved gaps"))
+        left_open = found["residual: motion"] + found["residual: springs"]
         assert gap == pytest.approx(left_open, abs=1e-9 * found["energy exchanged"])
         assert strip.struck.any() == (struck > 0)
         assert not strip.at_rest

@@ -4,9 +4,9 @@ The normal force (5) of a contact is a spring K s and a damper −B v_n; their s
 K s² / 2. The damper's work is its force, held over the step, times the distance by which the touching points separate.
 
 A force held over a step does other work than a force that changes within the step. This error belongs to the integrator
-and falls with its declared order; any residual that does not fall is a fault. The residual has three channels: the
-motion, the contact springs, and the curvature of the gaps, along which the step pushes by J Δq. They may have opposite
-signs, so their absolute values are added.
+and falls with its declared order; any residual that does not fall is a fault. The residual has two channels, the motion
+and the contact springs. The two may have opposite signs, so their absolute values are added. A line of its own has the
+part of the springs that curved gaps cause: the step pushes along J Δq, the touching points move along arcs.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def energy_book(run: Run) -> dict[str, float]:
         "lost in impacts": float(series["lost impacts"][-1]) + 0.0,  # + 0.0 turns −0.0 into 0.0
         "lost in contact damping": float(damping) + 0.0, "lost in friction": float(series["lost friction"][-1]) + 0.0,
         "residual: motion": float(ledger["integration_residual"][-1]),
-        "residual: springs": float(pushed + damping) + float(springs[-1] - springs[0]),
-        "residual: curved gaps": float(ledger["penalty_work"][-1]) - pushed,
+        "residual: springs": float(ledger["penalty_work"][-1] + damping) + float(springs[-1] - springs[0]),
+        "of the springs' residual, curved gaps": float(ledger["penalty_work"][-1]) - pushed,
         "energy exchanged": turned,
     }
     gain = float((held - held[0] - series["given"]).max())
@@ -88,8 +88,8 @@ def turned_over(run: Run) -> float:
 
 
 def left_open(book: Book) -> float:
-    """Return the energy residual [J]: the sum of the absolute residuals of motion, springs and curved gaps."""
-    return sum(abs(value) for name, value in book.items() if name.startswith("residual: "))
+    """Return the energy residual [J]: the sum of the absolute residuals of motion and springs."""
+    return abs(book["residual: motion"]) + abs(book["residual: springs"])
 
 
 def total(book: Book, when: str) -> float:

@@ -142,7 +142,7 @@ def _of_residuals(table: Table) -> Iterator[Part]:
     said = "".join(f", {row['scene']} {row[OPEN]:.1f} %" for row in wide)
     yield Part(
         f"At the scene's own time step the residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged in "
-        f"{len(wide)} of {len(rows)} scenes (absolute values of motion, springs and curved gaps added)"
+        f"{len(wide)} of {len(rows)} scenes (absolute values of motion and springs added)"
         f"{said and ':' + said[1:]}.", MIXED if wide else REPRODUCED,
         miss=f"time stepping leaves up to {wide[0][OPEN]:.1f} % of a scene's energy unaccounted for "
              f"({wide[0]['scene']})" if wide else "")
@@ -170,7 +170,7 @@ CONTACTS = Check(
 RESIDUALS = Check(
     key="what the books leave open", question="Does the residual fall with the integrator's order?",
     cases=lambda study: scene_names(), row=_open, says=_of_residuals, digits=3,
-    note="Residuals of the energy balance, absolute values of motion, springs and curved gaps added. No order: the "
+    note="Residuals of the energy balance, absolute values of motion and springs added. No order: the "
     f"residual is rounding, and no shorter step was tried. The step for a residual of {WORTH_NAMING:g} % is the "
     "longest one tried that reaches it, or is extrapolated with the measured order.",
 )
@@ -179,8 +179,8 @@ BOOKS = Check(
     cases=lambda study: scene_names(), row=lambda study, name: book_row(_run(study, name)), says=_of_books, digits=3,
     note="End − start = work of hand and coupling − losses + residual. The residual is energy that time stepping "
     "created (> 0) or lost (< 0). Its part in the motion comes from forces held constant over a step, its part in the "
-    "springs from evaluating them once a step, its part in curved gaps from pushing along J Δq instead of the path of "
-    "the touching points; the share adds the absolute values. A loss is also a force times a "
+    "springs from evaluating them once a step and, in curved gaps, from pushing along J Δq instead of the path of the "
+    "touching points; the share adds both absolute values. A loss is also a force times a "
     "path with the force held over each step, so it can come out slightly negative. Shares are of the energy "
     "exchanged: the largest of kinetic energy, range of the potential energy, work of the hand and work of the "
     "coupling.",
@@ -208,7 +208,7 @@ scene_ledger = Topic(
     question="Every scene file of the project is run in the world IAPB at its own time step. An energy balance "
     "accounts for each run: the change of stored energy equals the work of hand and coupling minus the losses. The "
     "residual is the error of time stepping; it must fall with the integrator's order when the step is shortened. "
-    "Residuals are given as shares of the energy exchanged. The absolute residuals of the motion, of the contact "
-    "springs and of curved gaps are added, so opposite signs do not cancel.",
+    "Residuals are given as shares of the energy exchanged. The absolute residuals of the motion and of the contact "
+    "springs are added, so opposite signs do not cancel.",
     checks=(CONTACTS, RESIDUALS, BOOKS, OVER_TIME), says=_answer,
 )

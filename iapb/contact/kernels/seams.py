@@ -13,6 +13,7 @@ from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.linalg import add, dot, load, scale, store
 
 _OVERLAPS = 1e-9  # [m] what must be left without the sag; above the rounding of positions, below a sag that matters
+_LARGEST_SAG = 2e-4  # [m] twice the sag that the chosen stiffness allows; a deeper body has sunk into the next one, too
 _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body, too
 
 
@@ -45,7 +46,8 @@ def explained(world, state, i, count):
     contacts, n = state.contacts, load(state.contacts.normal, i)
     for j in range(count):
         normal = load(contacts.normal, j)
-        if contacts.is_new[j] or is_stop(contacts, j) or dot(n, normal) > _SAME_NORMAL:
+        if (contacts.is_new[j] or contacts.gap[j] < -_LARGEST_SAG or is_stop(contacts, j)
+                or dot(n, normal) > _SAME_NORMAL):
             continue
         for body, sign in ((contacts.body_a[j], 1.0), (contacts.body_b[j], -1.0)):
             if body >= 0 and (body == contacts.body_a[i] or body == contacts.body_b[i]):

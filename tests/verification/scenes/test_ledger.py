@@ -37,7 +37,7 @@ def unaccounted(book: dict[str, float]) -> float:
     """End − start − given + lost − open [J]."""
     given = book["work of the hand"] + book["work of the coupling"]
     lost = book["lost in impacts"] + book["lost in contact damping"] + book["lost in friction"]
-    left = sum(value for name, value in book.items() if name.startswith("residual: "))
+    left = book["residual: motion"] + book["residual: springs"]
     return total(book, "end") - total(book, "start") - given + lost - left
 
 
@@ -57,9 +57,9 @@ def test_opposite_signs_do_not_cancel(runs: dict[str, Run]) -> None:
 
 def test_curved_gaps_have_a_line_of_their_own(runs: dict[str, Run]) -> None:
     """A gap along a slide is linear; the corners of the peg move on arcs, which shorter steps follow better."""
-    assert abs(energy_book(runs["wall_1d"])["residual: curved gaps"]) < 1e-15
+    assert abs(energy_book(runs["wall_1d"])["of the springs' residual, curved gaps"]) < 1e-15
     made = [energy_book(simulate(load_scene(find_scene("peg_corner")).with_values({"rate": rate})))
-            ["residual: curved gaps"] for rate in (512, 4096)]
+            ["of the springs' residual, curved gaps"] for rate in (512, 4096)]
     assert abs(made[0]) > 4.0 * abs(made[1]) > 0.0
 
 
