@@ -28,7 +28,7 @@ from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
-from iapb.scene.parts import LARGEST_NUMBER, written
+from iapb.scene.parts import LARGEST_NUMBER, STIFFEST, written
 from iapb.schema import zeros_of
 
 Floats = NDArray[np.float64]
@@ -515,9 +515,9 @@ def _firm(scene: Scene) -> tuple[dict[str, float], tuple[str, ...]]:
     load += scene.hand.largest_force(scene.duration) if scene.hand is not None else 0.0
     K, choice = scene.contact.stiffness, dict[str, float]()
     if "stiffness" in scene.chosen_fields:
-        choice["stiffness"] = K = min(_up(SPARE_LOAD * load / sag), LARGEST_NUMBER)
+        choice["stiffness"] = K = min(_up(SPARE_LOAD * load / sag), STIFFEST)
     if "damping" in scene.chosen_fields:
-        choice["damping"] = min(_up(K * RELAXATION), LARGEST_NUMBER)
+        choice["damping"] = min(_up(K * RELAXATION), STIFFEST)
     sags = f"; a load of {load:.3g} N sags by {in_metres(load / K)}" if K > 0.0 else ""
     return choice, (f"chosen for implicit contact: {_listed(choice)}{sags}",)
 

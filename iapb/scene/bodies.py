@@ -313,16 +313,18 @@ class SpatialBody(AnyBody, _SpatialJoint):
     @classmethod
     def _turned_by_the_joint(cls, inertia: Any, info: ValidationInfo) -> Any:
         matrix, free = inertia_matrix(inertia), info.data.get("joint") in ("spherical", "free_flyer")
-        require(bool((matrix == matrix.T).all()), "a symmetric matrix")
+        rounding = 1e-12 * np.abs(matrix).max()
+        require(np.ndim(inertia[0]) == 0 or bool((abs(np.subtract(inertia, matrix)) <= rounding).all()),
+                "a symmetric matrix")
         require(not free or np.linalg.eigvalsh(matrix)[0] >= SMALLEST_POSITIVE,
                 f"principal moments >= {SMALLEST_POSITIVE} kg m2: the joint turns about all axes")
         return inertia
 
 
 def inertia_matrix(inertia: Any) -> NDArray[np.float64]:
-    """Return the inertia matrix (3, 3) given by three, six or nine numbers."""
+    """Return the inertia matrix (3, 3) given by three, six or nine numbers; of nine the symmetric part."""
     if len(inertia) == 3 and np.ndim(inertia[0]) == 1:
-        return np.array(inertia, np.float64)
+        return 0.5 * np.add(inertia, np.transpose(inertia), dtype=np.float64)
     xx, yy, zz, xy, xz, yz = (*inertia, 0.0, 0.0, 0.0)[:6]
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], np.float64)
 

@@ -23,6 +23,7 @@ from iapb.scene.document import Document, yaml_text
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
     Fraction,
+    Gain,
     Name,
     NonNegative,
     Number,
@@ -72,8 +73,8 @@ class Contact(Part):
     forces: Literal["implicit", "paper"] = Field("implicit", description="implicit (default): resting forces that no "
         "stiffness or step makes unstable, friction in impacts, stiffness and damping chosen for a sag below 0.1 mm; "
         "paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; contact: paper is short for it")
-    stiffness: NonNegative = Field(1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen")
-    damping: NonNegative = Field(50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen")
+    stiffness: Gain = Field(1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen")
+    damping: Gain = Field(50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen")
     penalty: Literal["clamped", "printed"] = Field("clamped", description="clamped (default): never pulls; printed: "
         "(5) to the letter, may pull")
     friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")

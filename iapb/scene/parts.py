@@ -13,12 +13,14 @@ from iapb.errors import Mistake, shown
 from iapb.names import nearest
 
 LARGEST_NUMBER = 1e9  # SI units; products of four such numbers are far below the double overflow limit
-SMALLEST_POSITIVE = 1e-12  # positive values may be divisors; their inverse square must not overflow
+STIFFEST = 1e15  # [N/m, N s/m] of contacts: heavier loads than any scene's sag by less than 0.1 mm
+SMALLEST_POSITIVE = 1e-18  # the inertia of a grain; positive values may be divisors: their square must not underflow
 
 _FINITE = {"strict": True, "allow_inf_nan": False}
 Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, **_FINITE)]
 Positive = Annotated[float, Field(ge=SMALLEST_POSITIVE, le=LARGEST_NUMBER, **_FINITE)]
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST_NUMBER, **_FINITE)]
+Gain = Annotated[float, Field(ge=0.0, le=STIFFEST, **_FINITE)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0, **_FINITE)]
 OwnRestitution = Annotated[Fraction | None, Field(
     description="its own e of (10) [1]; of two that touch the smaller counts; default: the other's, or contact's")]
