@@ -551,3 +551,25 @@ add("fast_box_and_plate",
 add("fast_ball_and_plate",
     scene(0.1, [ball("ball", 0.01, 0.05, (-0.497, 0, 0), (50, 0, 0, 0, 0, 0))], [PLATE_3D], gravity=0.0),
     beyond(-0.015), 0.0, 0.01, "stops before the middle of the plate", 0.5)
+
+# Seams of flush walls, heavy loads, gaps that bend
+
+TILES = [{"name": f"tile_{k}", "kind": "box", "center": [0.1 * k, -0.05], "size": [0.1, 0.1]} for k in range(-1, 18)]
+TILES_3D = [{"name": f"tile_{k}_{j}", "kind": "box", "center": [0.1 * k, 0.1 * j, -0.05], "size": [0.1, 0.1, 0.1]}
+            for k in range(-1, 8) for j in range(3)]
+add("disc_over_tiles", scene(1.0, [disc("disc", R, 0.2, (0, R, 0), (1.5, 0, -1.5 / R))], TILES, 0.3),
+    moved(), 1.5, 1.5, "rolls over 15 seams")
+for e in (0.0, 0.5):
+    add(f"box_over_tiles_{100 * e:.0f}_percent",
+        scene(0.5, [box("box", (0.08, 0.05), 0.2, (0, 0.025, 0), (2, 0, 0))], TILES, 0.1, e),
+        moved(), 1.0 - 0.1 * G * 0.125, 1.0, "slides over 8 seams")  # fmt: skip
+add("box_over_tiles_in_space",
+    scene(0.4, [box("box", (0.13, 0.08, 0.04), 0.5, (0, 0.05, 0.02), (1.5, 0.1, 0, 0, 0, 0))], TILES_3D, 0.1),
+    moved(), 0.6 - 0.1 * G * 0.08 * 1.5 / math.hypot(1.5, 0.1), 0.6, "slides over 5 seams")  # fmt: skip
+add("heavy_box_rests", scene(1.0, [box("box", (1, 1), 1e6, (0, 0.5, 0))], [FLOOR], 0.5),
+    lambda motion: motion.place[-1, 0, 1], 0.5, 0.01, "1000 t sink by less than 0.1 mm")
+ARM = {"name": "arm", "joint": "revolute", "mass": 10, "inertia": 1, "velocity": [10]}
+SLIDER = {"name": "slider", "parent": "arm", "joint": "prismatic", "axis": [1, 0], "mass": 0.5, "inertia": 1e-3,
+          "position": [0.2999], "joint_limits": [0, 0.3]}
+add("slider_on_a_turning_arm", scene(0.5, [ARM, SLIDER], gravity=0.0),
+    lambda motion: np.linalg.norm(motion.place[-1, 1]), 0.3, 0.01, "its stop holds it at 0.3 m")
