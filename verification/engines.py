@@ -214,7 +214,8 @@ def _is_ours(row: Row) -> bool:
 
 def _misses(rows: Iterable[Row]) -> str:
     """The misses in words."""
-    return ", ".join(f"{row['scene']} {_worst(row)} {'at own settings' if row['settings'] == OWN else 'at 1 ms'}"
+    settings = {True: "with its own settings", False: "at a step of 1 ms"}
+    return ", ".join(f"{row['scene']} {_worst(row)} {settings[row['settings'] == OWN]}"
                      for row in rows if row["law"] != MET)  # fmt: skip
 
 

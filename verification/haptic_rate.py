@@ -39,7 +39,7 @@ def _kernels_say(table: Table) -> Part:
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:
     met = f"{sum(part.verdict == REPRODUCED for part in parts)} of {len(parts)}"
-    answer = f"{met} speed targets met"
+    answer = f"{met} of our own speed targets met"
     for contacts, _, _, ratio in list(printed_over_factored(tables[SCALING.key]))[-1:]:
         answer += f"; with {contacts} contacts the engine's impact is {ratio:.0f} times as fast as the printed formula"
     return Part(f"{answer}.", "", quantities=(("speed targets", met),))

@@ -69,8 +69,8 @@ def verdict_of_families(holds: Iterable[bool | None]) -> str:
 
 def _recorded_says(table: Table) -> Part:
     gains, impacts = _sums(table)
-    return Part(f"{gains} of {impacts:,} impacts in {len(table.rows):,} runs of the engine gained energy in exact "
-                "arithmetic", "", quantities=(("impacts certified", f"{impacts:,}"),))  # fmt: skip
+    return Part(f"Judged in exact arithmetic, {gains or 'none'} of {impacts:,} impacts in {len(table.rows):,} runs of "
+                "the engine gained energy", "", quantities=(("impacts certified", f"{impacts:,}"),))  # fmt: skip
 
 
 def _drawn_says(table: Table) -> Part:

@@ -77,46 +77,37 @@ def agreement_map(numbers: Table, border: Table) -> Drawn:
     return Drawn(panels, numbers, {"agree": OUTCOMES["holds"], "differ": OUTCOMES["fails"], "r = c": BOUND})
 
 
-_AGREE = 1e-11  # of |v⁻|: motions closer than this are equal
 _COUNTS = (5, 10, 20, 50, 100, 200)  # ticks
 
 
 @recipe("where-to-stop", "complementarity/piles")
 def where_to_stop(numbers: Table) -> Drawn:
-    """Draw the distance from complementarity over contacts and redundancy, and the time of impulses that only push."""
-    rows = [row | {"redundant share": row["redundant"] / row["contacts"],
-                   "distance": max(row["median distance from the LCP"], _AGREE),
+    """Draw over the contacts how often (19) is right, how many impulses pull, and the time of impulses that push."""
+    rows = [row | {"right": 100.0 * row["share that agrees"], "pull": 100.0 * row["share of impulses that pull"],
                    "price": row["time of pushing"] / row["time of (21)"]} for row in numbers.records()]  # fmt: skip
-    looks = looks_of(f"contacts that are {given}" for given in numbers.column("rows"))
+    looks = looks_of(f"(19) for {given} contacts" for given in numbers.column("rows"))
     limit = max(row["most contacts that agree"] for row in rows)
     least, most = (f"{end(row['price'] for row in rows):.2g}" for end in (min, max))
     panels = []
-    for x, y, alt, label in (
-        ("contacts", "distance", f"No pile of more than {limit} contacts agrees.",
-         "distance over the number of contacts"),
-        ("redundant share", "distance", "Distance over the share of redundant contacts.",
-         "distance over the share that is redundant"),
-        ("contacts", "price", f"Pushing takes {least} to {most} times as long as (21).",
-         "price of impulses that only push"),
+    for y, alt, label, axis in (
+        ("right", f"No pile of more than {limit} contacts agrees.", "how often (19) agrees with complementarity",
+         "piles that agree [%]"),
+        ("pull", "Share of impulses that pull over contacts.", "impulses of (19) that pull", "impulses that pull [%]"),
+        ("price", f"Pushing takes {least} to {most} times as long as (21).", "price of impulses that only push",
+         "time, pushing over (21)"),
     ):  # fmt: skip
-        with Plot(f"where-to-stop-{'price' if y == 'price' else x.replace(' ', '-')}") as plot:
+        with Plot(f"where-to-stop-{y}") as plot:
             for name, look in looks.items():
-                plot.marks([(row[x], row[y]) for row in rows if name.endswith(f" {row['rows']}")], look)
-            if y == "distance":
-                plot.log(x, "distance of the motions, of |v⁻|", "y", ylim=(0.3 * _AGREE, 3.0))
-            else:
+                plot.marks([(row["contacts"], row[y]) for row in rows if f" {row['rows']} " in name], look)
+            if y == "price":
                 plot.axes.axhline(1.0, **line_arguments(BOUND, marked=False))
-                plot.axes.set(xlabel=x, ylabel="time, pushing over (21)", ylim=(0.0, None))
-            if x == "contacts":
-                plot.axes.set_xscale("log")
-                plot.axes.set_xticks(_COUNTS, [str(count) for count in _COUNTS])
-                plot.axes.minorticks_off()
-                if y == "distance":
-                    plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
+            lowest = -4.0 if y == "right" else 0.0
+            plot.axes.set(xlabel="contacts at once", ylabel=axis, xscale="log", ylim=(lowest, None))
+            plot.axes.set_xticks(_COUNTS, [str(count) for count in _COUNTS])
+            plot.axes.minorticks_off()
         panels.append(Panel(plot.svg, alt, label))
     pushed = max(row["pushing from the LCP"] for row in rows)
-    return Drawn(panels, numbers, looks | {"stop here": BOUND},
-                 {"limit": limit, "pushed": pushed, "least": least, "most": most})
+    return Drawn(panels, numbers, looks, {"limit": limit, "pushed": pushed, "least": least, "most": most})
 
 
 # At most six curves; the table has all solvers. In the table, "IAPB" is the engine called from Python.

@@ -82,44 +82,48 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
         plot.log("contacts", "time of Lemke / time of IAPB", ylim=(0.35 * min(ratios), 2.0 * max(ratios)))
         plot.ticks("y", [0.5, 1.0, 2.0, 10.0, 100.0])
         plot.ticks("x", [1, 2, 4, 8, 16, 32, 64, 128, 300])
-    told = {"families": said.strip(), "hard": _lost_on_hard_impacts(numbers).strip()}
     alt = "Both methods are compiled and timed in turns (claim C22). Below the line at 1 IAPB is slower. " + said
-    return Drawn([Panel(plot.svg, alt.strip())], kernels, looks, told)
+    panels = [Panel(plot.svg, alt.strip()), Panel(*_lost_on_hard_impacts(numbers), "hard impacts", wide=True)]
+    return Drawn(panels, kernels, looks, {"families": said.strip()})
 
 
 def _lost_on(name: str, kernels: Table) -> str:
     """Say for which contact counts of one family IAPB clearly costs more, and by which factor at worst."""
     slower = [row for row in kernels.records() if costs_more(row) is False]
     faster = max((row for row in kernels.records() if row["ratio"]), key=lambda row: float(row["ratio"]))
-    won = f"at best, Lemke takes {faster['ratio']:.3g} times as long as IAPB ({_contacts(faster)}). "
+    won = f"up to {faster['ratio']:.3g} times faster ({_contacts(faster)}). "
     if not slower:
-        return f"On {name} IAPB is clearly slower at no size; {won}"
+        return f"On {name} IAPB is never clearly slower, and {won}"
     worst, sizes = min(slower, key=lambda row: float(row["ratio"])), [row["contacts"] for row in slower]
-    return (f"On {name} IAPB is clearly slower at {len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} "
-            f"to {max(sizes)} contacts: at worst, it takes {1 / worst['ratio']:.2g} times as long as Lemke "
-            f"({_contacts(worst)}); {won}")  # fmt: skip
+    return (f"On {name} IAPB is up to {1 / worst['ratio']:.2g} times slower ({_contacts(worst)}), clearly so at "
+            f"{len(sizes)} of {len(kernels.rows)} sizes, from {min(sizes)} to {max(sizes)} contacts, and {won}")
 
 
-def _lost_on_hard_impacts(numbers: Table) -> str:
-    """Say on how many hard impacts another solver is faster than IAPB: both compiled, then both from Python."""
-    said = ""
-    for called, how in ((impacts.COMPILED, "compiled"), (impacts.PYTHON, "called from Python")):
-        lost, told = impacts.lost_to_rivals(numbers, called), []
-        for c in dict.fromkeys(lost.column("contacts")):
+def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
+    """Return a table of the fastest rival by number of contacts, compiled and called from Python, and its text."""
+    heads = {impacts.COMPILED: "fastest compiled", impacts.PYTHON: "fastest called from Python"}
+    lines: dict[str, list[str]] = {}
+    for called in heads:
+        lost = impacts.lost_to_rivals(numbers, called)
+        for c in dict.fromkeys(numbers.column("contacts")):
             here, cases = lost.where(contacts=c), set(numbers.where(called=called, contacts=c).column("problem"))
-            best = max(here.records(), key=lambda row: float(row["ratio"]))
-            told.append(f"{len(set(here.column('problem')))} of {len(cases)} with {_contacts(best)} "
-                        f"({best['solver']} by up to {best['ratio']:.2g} times)")
-        said += (f"Hard impacts on which another solver is faster than IAPB, both {how}, with an error of at most "
-                 f"1e-6: {'; '.join(told) or 'none'}. ")
-    return said
+            best = max(here.records(), key=lambda row: float(row["ratio"]), default=None)
+            told = "IAPB" if best is None else (
+                f"{best['solver']}: up to {best['ratio']:.2g} times faster, on {len(set(here.column('problem')))} of "
+                f"{len(cases)}")
+            lines.setdefault(_contacts({"contacts": c}), []).append(told)
+    words = "; ".join(f"{size}: " + ", ".join(map("{}: {}".format, heads.values(), said))
+                      for size, said in lines.items())  # fmt: skip
+    return grid(tuple(heads.values()), {size: [*map(cell, said)] for size, said in lines.items()}, "plain"), words
 
 
 @recipe("impact-accuracy", "work_precision")
 def impact_accuracy(numbers: Table) -> Drawn:
-    """Draw a panel per size."""
+    """Draw a panel per size; with one contact every method is exact, so there is nothing to draw."""
     panels = []
     for c, d in dict.fromkeys(numbers.select(("contacts", "coordinates")).rows):
+        if c == 1:
+            continue
         here = numbers.where(contacts=c, coordinates=d)
         with Plot(f"impact-accuracy-{c}", (4.1, 3.2)) as plot:
             front: list[tuple[float, float]] = []
@@ -131,7 +135,7 @@ def impact_accuracy(numbers: Table) -> Drawn:
             plot.log("time of one impact [µs]", "relative error", xlim=(0.05, 4e5), ylim=(1e-17, 10.0))
             plot.axes.set_xticks(_DECADES)
         alt = f"Error against time with {c} contacts on {d} coordinates for {', '.join(_LOOKS)}."
-        panels.append(Panel(plot.svg, alt, f"{c} contact{'s' * (c > 1)}, {d} coordinates"))
+        panels.append(Panel(plot.svg, alt, f"{c} contacts, {d} coordinates"))
     return Drawn(panels, numbers, _LEGEND)
 
 
@@ -206,8 +210,8 @@ _NEVER = "never worth its time here"
 _PALE = 0.45  # strength of marks that are not used
 
 
-def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle]) -> Drawn:
-    """Draw what a motion costs by world or by integrator: a panel with a table, and a panel per scene."""
+def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle], most: int | None = None) -> Drawn:
+    """Draw what a motion costs by world or by integrator: a table, and a panel for each of the first `most` scenes."""
     looks = {name: look for name, look in drawn.items() if name in motions.column("method")}
     found, worth = motion.curves(motions, tuple(looks)), motion.worth(motions, tuple(looks))
     told, table = [], dict[str, Sequence[Markup]]()
@@ -217,18 +221,18 @@ def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle]) -> Draw
         table[Markup("{} {}").format(swatch(look), look.name)] = [
             cell(Markup("<b>{}</b>").format(said) if said == _NEVER else said) for said in words]
     panels = [Panel(grid(_HEADINGS, table, "plain"), "; ".join(told), wide=True)]
-    for number, scene in enumerate(dict.fromkeys(motions.column("scene"))):
+    for number, scene in enumerate([*dict.fromkeys(motions.column("scene"))][:most]):
         here = [curve for curve in found if curve.scene == scene]
         said = ", ".join(f"{looks[curve.method].name}: {curve.words}" for curve in here)
         lost = motions.only(outcome != "ok" for outcome in motions.column("outcome")).where(scene=scene)
         panels.append(Panel(_motions(f"{key}-{number}", here, lost, looks),
                             f"{scene}: error of position against computing time. {said}.", scene))
-    limits = {"gained": motion.GAINED, "runs": motion.FIT_RUNS, "fall": motion.FIT_FALL, "useful": motion.USEFUL}
-    return Drawn(panels, worth, {look.name: look for look in looks.values()} | {"best for its time": _FRONT}, limits)
+    return Drawn(panels, worth, {look.name: look for look in looks.values()} | {"best for its time": _FRONT})
 
 
-RECIPES = tuple(recipe(key, "haptic-rate/motions")(partial(_precision, key, drawn=drawn)) for key, drawn in
-                (("trajectory-precision", _WORLDS), ("integrator-precision", _INTEGRATORS)))
+RECIPES = tuple(recipe(key, "haptic-rate/motions")(partial(_precision, key, drawn=drawn, most=most))
+                for key, drawn, most in (("trajectory-precision", _WORLDS, None),
+                                         ("integrator-precision", _INTEGRATORS, 1)))
 
 
 def _worth_said(row: Row) -> tuple[str, ...]:
@@ -260,8 +264,6 @@ def _motions(key: str, here: Sequence[motion.Curve], lost: Table, looks: Mapping
             plot.curve(places(curve.runs), replace(look, width=0.8), marked=False)
             plot.marks(places(curve.used), bare, markersize=5.5)
             plot.marks(places(curve.left_out), bare, markersize=3.8, alpha=_PALE)
-            for run in filter(motion.by_chance, curve.left_out):
-                note(plot.axes, (run["time"], 1.3 * floor), "↓", color=look.color)
             if curve.cost is not None:  # the fitted power law over the range of the fitted runs
                 time, error = (np.log10(column) for column in zip(*places(curve.used), strict=True))
                 ends = np.array([time.min(), time.max()])

@@ -186,7 +186,7 @@ def standalone(figure: Figure) -> str:
     steps = [66 + _LETTER * len(text) for text, _ in figure.legend]
     x = (whole - sum(steps)) / 2
     for (text, look), step in zip(figure.legend, steps, strict=True):
-        parts.append(swatch(look).replace("<svg", f'<svg x="{x:g}" y="{below - 11:g}" width="36" height="14"', 1))
+        parts.append(str(swatch(look)).replace("<svg", f'<svg x="{x:g}" y="{below - 11:g}" width="36" height="14"', 1))
         parts.append(f'<text x="{x + 44:g}" y="{below:g}" fill="{INK}">{escape(text)}</text>')
         x += step
     width, height = whole, below + 0.5 * _LEGEND

@@ -9,16 +9,18 @@ import numpy as np
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
-from reports.figures.style import BOUND, MUTED, STYLES, LineStyle
+from reports.figures.style import BOUND, FORCE, MUTED, RULE, STYLES, LineStyle
 from verification.table import Table
 
-_HOLDS = {  # which laws hold a wall -> its mark, in the colour of the world
+_HOLDS = {  # where a wall comes to rest, else what the mass does with impulses -> its mark, in the colour of the world
     "both laws": LineStyle(MUTED, "o", (), 0.0),
     "only impulses": replace(STYLES["impulses"], width=0.0, filled=False, name=""),
     "only penalties": replace(STYLES["penalty"], width=0.0, name=""),
+    "neither, keeps bouncing": LineStyle(RULE, "s", (), 0.0),
+    "neither, moves ever more": LineStyle(FORCE, "X", (), 0.0),
 }
 _LOOP = ("rate", "sensors", "device damping")
-_SETTLES = "+"
+_SETTLES, _GROWS = "+", "x"
 
 
 @recipe("stability-map", "stability/maps", "stability/dampings")
@@ -35,10 +37,13 @@ def _walls(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray
     stiffness, bound = np.array(walls.column("stiffness")), np.array(walls.column("passive up to"))
     theirs, ours = (np.array([[mark == _SETTLES for mark in marks] for marks in walls.column(law)])
                     for law in ("penalties", "impulses"))  # fmt: skip
+    grows = np.array([[mark == _GROWS for mark in marks] for marks in walls.column("impulses")])
+    neither = ~theirs & ~ours
     shown = np.where(damping > 0.0, damping, damping[damping > 0.0].min() / 2.0)  # the row without damping
     K, B = np.meshgrid(stiffness, shown, indexing="ij")
     with Plot(f"stability-map-{number}", (3.1, 2.5)) as plot:
-        for where, look in zip((theirs & ours, ours & ~theirs, theirs & ~ours), _HOLDS.values(), strict=True):
+        states = (theirs & ours, ours & ~theirs, theirs & ~ours, neither & ~grows, neither & grows)
+        for where, look in zip(states, _HOLDS.values(), strict=True):
             plot.marks(zip(K[where], B[where], strict=True), look, markersize=3.6)
         if (bound > 0.0).any():
             fine = np.geomspace(stiffness[0], 2.0 * b * rate * 0.999, 60)

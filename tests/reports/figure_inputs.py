@@ -39,9 +39,9 @@ def tables() -> dict[str, Table]:
         "complementarity/two contacts": ("cosine; speed ratio; agreement predicted; agreement found", (
             (0.1 * k, 0.1 * m, m >= k, m >= k) for k in range(-9, 10, 3) for m in range(1, 11, 3))),
         "complementarity/piles": (
-            "rows; contacts; redundant; most contacts that agree; median distance from the LCP; pushing from the LCP; "
-            "time of (21) [µs]; time of pushing [µs]", (
-                (rows, c, c / 3, 6, 0.0 if c < 6 else 0.1 * c**0.3, 1e-16, 40.0 + c, 300.0 + c * c)
+            "rows; contacts; share that agrees; most contacts that agree; share of impulses that pull; "
+            "pushing from the LCP; time of (21) [µs]; time of pushing [µs]", (
+                (rows, c, 1.0 * (c < 6), 6, 0.0 if c < 6 else 0.1 * c**0.3, 1e-16, 40.0 + c, 300.0 + c * c)
                 for rows in ("approaching", "touching") for c in (5, 12, 40, 150))),
         "complementarity/time per impact": (
             "impacts; contacts; solver; outcome; median [µs]; least [µs]; largest [µs]", (

@@ -193,7 +193,8 @@ def test_a_drawing_is_whole_asks_for_nothing_and_takes_the_colours_of_the_page(f
 def test_a_table_is_html_in_the_page_and_in_its_own_file(gallery: Gallery) -> None:
     tables = {figure.key: [panel for panel in figure.panels if panel.is_table] for figure in gallery.drawn}
     assert {key: len(found) for key, found in tables.items() if found} == {
-        "which-method": 1, "trajectory-precision": 1, "integrator-precision": 1, "engine-errors": 3}  # fmt: skip
+        "which-method": 1, "where-iapb-loses": 1, "trajectory-precision": 1, "integrator-precision": 1,
+        "engine-errors": 3}  # fmt: skip
     energy = ElementTree.fromstring(tables["engine-errors"][0].svg)
     assert {len(row) for row in energy.iter("tr")} == {7} and len(list(energy.iter("tr"))) == 9
     marks = {"".join(cell.itertext()): cell.get("style") for cell in energy.iter("td")}

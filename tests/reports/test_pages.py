@@ -253,14 +253,14 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     rows = [start.row() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "threshold": FULL}
             for start in FULL_GRID]  # fmt: skip
     found = claim.conclude(claim.table_of(rows))
-    pile = dict.fromkeys(("contacts", "redundant", "time of (21)", "time of pushing"), 10.0)
+    pile = dict.fromkeys(("share that agrees", "time of (21)", "time of pushing"), 10.0)
     piles = [pile | {"rows": "touching", "most contacts that agree": 14, "contacts": contacts,
-                     "median distance from the LCP": pulls, "pushing from the LCP": 1e-3 * pulls}
+                     "share of impulses that pull": pulls, "pushing from the LCP": 1e-3 * pulls}
              for contacts, pulls in ((10, 0.0), (40, 0.25))]  # fmt: skip
     topic = one("complementarity", tables={"piles": table_from(piles)})
     page = joined(Evidence(claims=(found,), topics=(topic,)))
     assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
-    assert "where more than 14 contacts collide at once" in page and f"with complementarity to {prose('3e-04')}" in page
+    assert "agreed with complementarity has 14" in page and f"agrees to {prose('3e-04')}" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(threshold="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
 

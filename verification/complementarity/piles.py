@@ -140,13 +140,13 @@ def _says(table: Table) -> Part:
     pulling = 100.0 * float(np.average([row["share of impulses that pull"] for row in beyond],
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
     return Part(
-        "Dense piles, with every colliding contact as an equality: some p >= 0 gives the velocity of (21) in "
-        f"{agree:.0f} of {piles} impacts, and in none with more than {limit} contacts. Do not use (19) where more than "
-        f"{limit} contacts collide at once: there {pulling:.0f} % of the impulses pull. With impulses that only push "
-        "(method \"poisson\", world IAPB-push) the velocity equals the LCP's to "
+        "Dense piles, with every colliding contact as an equality (19): impulses that push can produce the velocity "
+        f"in {agree:.0f} of {piles} impacts. The largest of these has {limit} contacts; this is no safe limit, since "
+        f"many smaller ones fail. Beyond {limit} contacts, {pulling:.0f} % of the impulses pull. With impulses that "
+        "only push (method \"poisson\", world IAPB-push) the velocity equals the LCP's to "
         f"{max(table['pushing from the LCP']):.0e}.",
         verdict_of_share(agree / piles), "piles",
-        miss=f"beyond {limit} contacts at once {pulling:.0f} % of IAPB's impulses pull")  # fmt: skip
+        miss=f"in impacts with more than {limit} contacts, {pulling:.0f} % of the impulses pull")  # fmt: skip
 
 
 def piles(folders: Iterable[Path | str]) -> Check:

@@ -55,9 +55,9 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     cases = sum(found["cases"]) or 1
     agree = sum(row["share that agrees"] * row["cases"] for row in found.records()) / cases
     held = sum(part.verdict == REPRODUCED for part in parts)
-    return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree exactly "
-            f"where pushing impulses (p >= 0) can produce IAPB's velocity "
-            f"({sum(found['contradictions'])} exceptions). {held} of {len(parts)} findings are "
+    return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree if and "
+            "only if pushing impulses (p >= 0) can produce IAPB's velocity: "
+            f"{sum(found['contradictions']) or 'no'} exceptions. {held} of {len(parts)} findings are "
             "reproduced without restriction.")
 
 

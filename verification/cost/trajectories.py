@@ -436,7 +436,7 @@ def _motions_say(motions: Table) -> Iterator[Part]:
         yield target(f"Whole motion, {scene}: smallest position error, in lengths of the body: {text}{more}.",
                      exact and fast, f"on the whole motion of {scene} " + (
                          "another method is as exact in less time" if exact else
-                         f"no step of IAPB is as exact as {most} ({_error(ours)} against {_error(best[most])})"))
+                         f"no time step makes IAPB as exact as {most} ({_error(ours)} against {_error(best[most])})"))
 
 
 def _error(run: Row) -> str:
@@ -456,5 +456,7 @@ WORTH = Check(
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
     note="Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "
     f"falls by a factor of {GAINED:g} or more from one to the next, where these are at least {FIT_RUNS} runs and the "
-    f"error falls at least {FIT_FALL:g}-fold over them: it is never extrapolated.",
+    f"error falls at least {FIT_FALL:g}-fold over them: it is never extrapolated. Best for "
+    f"its time: scenes in which no other run is both faster and more exact, among errors up to {USEFUL:g} lengths. "
+    "Energy made: the largest excess of the energy over its value at the start.",
 )  # fmt: skip

@@ -68,7 +68,7 @@ def wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
     value at which the step diverges.
     """
     values = {"contact.stiffness": factor * _BOUND, "contact.damping": 0.0, "duration": 3.0}
-    name = "Stiff wall at the Colgate bound" if factor == 1 else f"Stiff wall, {factor:,} times the Colgate bound"
+    name = ("Stiff wall at" if factor == 1 else f"Wall {factor:,} times stiffer than") + " Colgate's passivity bound"
 
     def measure(run: Run) -> Measured:
         """Measure the largest distance of the tool from the sampled law, relative to its initial gap to the wall."""

@@ -150,7 +150,7 @@ def _gains_say(table: Table) -> Iterator[Part]:
         most = " gains no energy" if ours[GAIN] <= 0.0 else \
             f"'s largest relative energy gain is {ours[GAIN]:.1e}, {ours[SHARE]:.2g} of its bound 10 d ε √κ(M)"
         yield Part(f"In {ours['impacts']:,} random impacts the engine{most}; the printed formula gains up to "
-                   f"{printed[GAIN]:.1e}.", REPRODUCED if ours[ABOVE] == 0 else REFUTED)
+                   f"{printed[GAIN]:.2g} times the energy before.", REPRODUCED if ours[ABOVE] == 0 else REFUTED)
 
 
 energy_gains = Topic(

@@ -62,9 +62,10 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
         (one.name, one.holds, YES if all(step.accepted for step in one.steps) else NO, one.sympy, one.coq,
          len(one.twins)) for one in records])  # fmt: skip
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
+    confirmed = sum(one.sympy == YES for one in records)
     sentence = (f"{proved} of {len(records)} statements are proved: a program expands the certificate of every step. "
-                f"SymPy confirms {sum(one.sympy == YES for one in records)} of the proofs. Exact counterexamples "
-                f"refute {twins} deliberately altered statements.")
+                f"SymPy confirms {'all ' * (confirmed == proved)}{confirmed}. Exact counterexamples refute "
+                f"{twins} deliberately altered statements.")
     parts = [Part(sentence, REPRODUCED if proved == len(records) else REFUTED)]
     tables = {"statements": table}
     if development:

@@ -190,10 +190,10 @@ def coupled(ports: Table) -> Part:
         case = row["the hand"], row["sensors"] == "ideal"
         most[case] = max(most.get(case, 0.0), row["needed / bound"])
     return Part(
-        "In CBuc, with the tool on a rigid wall, a pressing hand and ideal sensors, the device is passive once its "
-        f"damping reaches {most[PRESSES, True]:.4f} times b = KT/2 + |B| of the coupler. Late or coarse sensors need "
-        f"up to {most[PRESSES, False]:.3g} times that damping. A hand that moves in and out of contact needs up to "
-        f"{most[CROSSES, True]:.3g} times, because the coupler is already stretched when it switches on.",
+        "In CBuc, with the tool on a rigid wall, a pressing hand and ideal sensors, the device is passive from "
+        f"{most[PRESSES, True]:.4f} times the damping b = KT/2 + |B| that Colgate's bound predicts. Late or coarse "
+        f"sensors need up to {most[PRESSES, False]:.3g} times that damping. A hand that moves in and out of contact "
+        f"needs up to {most[CROSSES, True]:.3g} times, because the coupler is already stretched when it switches on.",
         MIXED if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
@@ -202,12 +202,12 @@ def coordinated(ports: Table) -> Part:
     found = ports.only(world != COUPLER_WORLD for world in ports["world"])
     needed, sums = found["damping needed"], found["with the coordination's gains"]
     return Part(
-        "With the four-channel controller the bound KT/2 + |B| of the wall alone is not enough: the device needs up to "
-        f"{max(found['needed / bound']):.3g} times as much damping, {min(needed):.3g} to {max(needed):.3g} N s/m, "
-        f"because the hand also feels the coordination's damping of {COORDINATION[1]:g} N s/m. The bound with gains of "
-        "wall and coordination added is not sufficient either: up to "
-        f"{max(map(truediv, needed, sums)):.3g} times its value is needed. Colgate's bound does not apply here because "
-        "the tool moves. The paper's device has no damping.", MIXED)  # fmt: skip
+        "With the four-channel controller the bound KT/2 + |B| of the wall alone is not enough: the device needs "
+        f"{min(needed):.3g} to {max(needed):.3g} N s/m, up to {max(found['needed / bound']):.3g} times the bound, "
+        f"because the hand also feels the coupling's {COORDINATION[1]:g} N s/m. With the coupling's gains added to "
+        f"those of the wall, the bound is nearly enough: up to {max(map(truediv, needed, sums)):.3g} times its value "
+        "is needed. Colgate's bound does not apply here because the tool moves. The paper's "
+        "device has no damping.", MIXED)
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:

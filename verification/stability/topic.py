@@ -56,14 +56,15 @@ def _of_maps(table: Table) -> Iterator[Part]:
     damped, bare = ideal & (b > 0.0), ideal & (b == 0.0)
     gains = int((passive & (theirs == GROWS))[damped].sum())
     yield Part(
-        f"Where b >= KT/2 + |B| holds, no wall may accelerate the hand: {gains} of {passive[damped].sum()} do. With "
-        f"this hand {(~passive & (theirs == SETTLES))[damped].sum()} walls outside the condition settle as well, "
-        "because the condition covers every hand.", REFUTED if gains else REPRODUCED)
+        f"Colgate's condition b >= KT/2 + |B| says that {passive[damped].sum()} walls are passive; {gains or 'none'} "
+        f"of them accelerated the hand. A further {(~passive & (theirs == SETTLES))[damped].sum()} walls settle "
+        "although the condition fails: it is for the worst hand, ours is a constant force.",
+        REFUTED if gains else REPRODUCED)
     shares = ", ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
                        for one in dict.fromkeys(rate[bare].tolist()))
     yield Part(
-        "The paper's device has no damping, b = 0. By the condition no wall is then passive for every hand. With this "
-        f"hand, a constant force, penalties are still stable on {shares} of these walls.", MIXED)
+        "The paper's device has no damping, b = 0. Then the condition holds for no wall. With a constant force as "
+        f"the hand, penalties are still stable on {shares} of these walls.", MIXED)
 
 
 def _held(table: Table, theirs: np.ndarray, ours: np.ndarray) -> Part:
@@ -72,11 +73,11 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray) -> Part:
     more = [ours[of].sum() / theirs[of].sum() for of in groups]
     lost = int((theirs & ~ours).sum())
     return Part(
-        f"Of {theirs.size} walls, {theirs.sum()} are stable with penalties and {ours.sum()} with impulses: "
-        f"{min(more):.2f} to {max(more):.2f} times as many, depending on the loop. {lost} walls are stable only "
-        "with penalties.",
+        f"Of {theirs.size:,} walls, {ours.sum()} are stable with impulses and {theirs.sum()} without "
+        f"({min(more):.2f} to {max(more):.2f} times as many, by sampling rate, sensor and damping of the device). "
+        f"Impulses destabilise {lost} walls.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
-        miss=f"{lost} of {theirs.size} walls are stable only without impulses" if lost else "")
+        miss=f"impulses destabilise {lost} of {theirs.size:,} walls (pairs of stiffness and damping)" if lost else "")
 
 
 def _hardness(study: Study, loop: Loop) -> Iterator[Row]:

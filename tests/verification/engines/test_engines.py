@@ -87,6 +87,6 @@ def test_the_answer_names_every_miss_ours_first():
     moved = replace(ours, measures={"drift [m]": 97.0}, scene="heavy_stack")
     other = replace(ours, engine="other", title="Another", measures={"drift [m]": 5.7}, choice="matched")
     _, answer = judged([other, moved])
-    assert answer.endswith("Missed by iapb (ours): heavy stack moves by 97 m at own settings; "
-                           "by Another: redundant wedge moves by 5.7 m at 1 ms.")
+    assert answer.endswith("Missed by iapb (ours): heavy stack moves by 97 m with its own settings; "
+                           "by Another: redundant wedge moves by 5.7 m at a step of 1 ms.")
     assert "Missed" not in judged([ours])[1]
