@@ -123,7 +123,7 @@ def find_contacts(world, state):
     state.contact_impulse[:count] = 0.0
     contact_velocities(world.mechanism, state.body, state.v, now, count)
     mark_new(now, count, before, state.contact_count[1], world.coherence_distance)
-    if world.implicit:
+    if world.switches.supports:
         count = state.contact_count[0] = leave_out_seams(world, state, count)
     classify(world, state, count)
     return count
