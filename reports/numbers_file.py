@@ -51,7 +51,7 @@ def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: st
 def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
     said = ("what", "outcome", "sentence")
     yield from _by_time("verdicts", said, ((one.timed, one.title, one.verdict, one.answer) for one in evidence.topics))
-    yield from _by_time("claims", said, ((one.timed, one.key, one.verdict, one.answer) for one in evidence.claims))
+    yield from _by_time("claims", said, ((one.timed, one.key, one.outcome, one.answer) for one in evidence.claims))
     yield from _by_time("claims/parts", ("part", "outcome", "holds in", "of", "cannot tell"), (
         (part.timed, f"{claim.key}: {part.name}", part.outcome, part.held, part.decided, part.unknown)
         for claim in evidence.claims for part in claim.parts))  # fmt: skip

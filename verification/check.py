@@ -96,6 +96,8 @@ class Check:
     spans : keys of the columns whose smallest and largest value the default sentence gives
     conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split the rows into parts,
         that count the cases of a row, that depend on measured times, and that are sentences (see `Column`)
+    roles : MISPRINT or BEYOND for each part, or value of a column of `parts`, that is not the statement of the question
+    named : the words for a part, or value of a column of `parts`, in an outcome such as "fails in rotation"
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no fresh cases
     prepare : (study, cases), called before the first row, for example to compute on several cores
     rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure refutes
@@ -117,6 +119,8 @@ class Check:
     counts: Collection[str] = ()
     timed: Collection[str] = ()
     prose: Collection[str] = ()
+    roles: Mapping[str, str] = field(default_factory=dict)
+    named: Mapping[str, str] = field(default_factory=dict)
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
     prepare: Callable[[Study, Sequence[Any]], object] | None = None
     rule: Callable[[Iterable[bool | None]], str] = verdict_of_law
@@ -156,7 +160,9 @@ class Check:
 
     def conclude(self, table: Table, study: Study | None = None) -> Finding:
         """Return the finding on a claim from its judged table; without a study it draws no fresh cases."""
-        parts = [judge_part(name, rows, self._fresh(study, name)) for name, rows in by_part(table).items()]
+        parts = [
+            replace(judge_part(name, rows, self._fresh(study, name)), role=_of_part(self.roles, name),
+                    named=_of_part(self.named, name)) for name, rows in by_part(table).items()]  # fmt: skip
         return self._found(str(self.says(table)) if self.says else "", parts, table)
 
     def not_computed(self) -> Finding:
@@ -194,6 +200,11 @@ class Check:
             said = Part(said, "", timed=any(column.timed for column in table.columns))
         given = (said,) if isinstance(said, Part) else tuple(said)
         return tuple(part if part.verdict else replace(part, verdict=self.rule(table.holds)) for part in given)
+
+
+def _of_part(words: Mapping[str, str], name: str) -> str:
+    """Return the word for a part, whose name is the values of its columns with commas between them; "" if none."""
+    return next((word for value, word in words.items() if f", {value}, " in f", {name}, "), "")
 
 
 def _spans(table: Table, keys: Iterable[str]) -> str:

@@ -27,6 +27,15 @@ REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
 )  # fmt: skip
 # A claim that fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
+# A part of a claim is the paper's statement (""), a formula as printed whose failure is an erratum, or ours, beyond the
+# paper. Only the paper's statement decides the claim.
+MISPRINT, BEYOND = "misprint", "beyond"
+# The verdicts in words, and what a claim comes to: those of its statement, and three that name what is wrong with it.
+IN_WORDS = dict(zip(VERDICTS, ("holds", "holds where stated", "holds in some trials", "fails", "cannot tell",
+                               "not computed"), strict=True))  # fmt: skip
+HOLDS, FAILS = IN_WORDS[REPRODUCED], IN_WORDS[REFUTED]
+MISPRINTED, FAILS_IN = f"{HOLDS}, {MISPRINT}", f"{FAILS} in a named quantity"
+KINDS = (HOLDS, MISPRINTED, IN_WORDS[WHERE], FAILS_IN, FAILS, IN_WORDS[NOT_TESTABLE], IN_WORDS[NOT_COMPUTED])
 LEAST_DECIDED = 10  # least number of trials that reproduce a part; for the reason see LEAST_CONFIRMING
 # A finding is reproduced only if every part is decided.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
@@ -50,6 +59,8 @@ class Part:
     timed : True if measured times enter
     optional : True if the part needs software that the project does not include; the other parts decide without it
     miss : one short clause for the first page that says where our method falls short; otherwise ""
+    role : "" for the statement of the question, MISPRINT or BEYOND for what is shown beside it and never decides
+    named : the quantity in words, for "fails in ..."; by default the name
     quantities : the QUANTITIES that the sentence quotes, each with its value as printed there
     """
 
@@ -65,6 +76,8 @@ class Part:
     optional: bool = False
     cases: int = 0
     miss: str = ""
+    role: str = ""
+    named: str = ""
     quantities: Quantities = ()
 
     def __post_init__(self) -> None:
@@ -72,8 +85,9 @@ class Part:
 
     @property
     def outcome(self) -> str:
-        """The verdict in words, with the region if there is one."""
-        return f"{self.verdict} {self.region}" if self.region else self.verdict
+        """The verdict in words, with the role and the region if there is one."""
+        said = f"{HOLDS} where {self.region}" if self.region else IN_WORDS[self.verdict]
+        return f"{said}, as printed" if self.role == MISPRINT else f"{said} (beyond the paper)" if self.role else said
 
 
 @dataclass(frozen=True)
@@ -123,6 +137,27 @@ class Finding:
         check_quantities(self.quantities, self.answer)
 
     @property
+    def outcome(self) -> str:
+        """What a claim comes to, in words; it follows from the parts that are the statement of the question."""
+        stated = [part for part in self.parts if not part.role]
+        refuted, mixed = ([part.named or part.name for part in stated if part.verdict == verdict]
+                          for verdict in (REFUTED, MIXED))  # fmt: skip
+        judged = sum(part.verdict != NOT_COMPUTED for part in stated)
+        if judged and judged in (len(refuted), len(mixed)):
+            return FAILS if refuted else f"{FAILS} in some trials"
+        mixed = [name for name in mixed if name not in refuted]
+        if refuted or mixed:
+            said = _listed("in", refuted), _listed("in some trials in", mixed)
+            return f"{FAILS} {', and '.join(filter(None, said))}"
+        misprinted = any(part.role == MISPRINT and part.verdict == REFUTED for part in self.parts)
+        return MISPRINTED if misprinted and self.verdict == REPRODUCED else IN_WORDS[self.verdict]
+
+    @property
+    def kind(self) -> str:
+        """The outcome without the name of the quantity: one of KINDS."""
+        return FAILS_IN if self.outcome.startswith(f"{FAILS} in ") else self.outcome
+
+    @property
     def computed(self) -> bool:
         """Whether the study gave a result."""
         return self.verdict != NOT_COMPUTED
@@ -140,6 +175,12 @@ def check_quantities(quantities: Quantities, sentence: str) -> None:
             raise ArgumentError("quantity", name, one_of(name, QUANTITIES))
         if not re.search(rf"(?<![\w.,]){re.escape(value)}(?!\w|[.,]\d)", sentence):  # no piece of a longer number
             raise ArgumentError(f"value of the quantity {name!r}", value, f"a number that is part of: {sentence}")
+
+
+def _listed(before: str, names: Iterable[str]) -> str:
+    """Return the names, each once, after a word: "in a, b and c"; "" without names."""
+    *others, last = dict.fromkeys(names) or [""]
+    return f"{before} {', '.join(others)} and {last}" if others else f"{before} {last}" if last else ""
 
 
 def check_depth(depth: str) -> None:
@@ -217,9 +258,9 @@ def _where_it_fails(trials: Table) -> str:
 def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
     """Return the verdict of a finding: that of its worst part. A failed case never counts as holding.
 
-    An optional part without any decided trial counts only if there is no other part.
+    A part with a role never counts. An optional part without any decided trial counts only if there is no other part.
     """
-    given = list(parts)
+    given = [part for part in parts if not part.role]
     absent = [part.optional and part.verdict == NOT_TESTABLE and not part.decided for part in given]
     counted = [part for part, left_out in zip(given, absent, strict=True) if not left_out] or given
     return worst([part.verdict for part in counted] + [NOT_COMPUTED] * bool(failures))

@@ -21,6 +21,7 @@ from reports.figures import RECIPES
 from reports.figures.figure import draw, standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, figure_inputs
+from reports.pages.first import count_claims
 from reports.pages.quantities import contradictions, unsaid
 from reports.pages.records import FailedCases
 from reports.report import keep_answer, kept_answer, remembering, report_key, write_companions, write_report
@@ -68,7 +69,10 @@ def make_report(out: Path, depth: str) -> Answer:
     ended, files = time.perf_counter(), len(evidence.manifest)
     took = {**evidence.seconds, "figures and page": ended - gathered}
     contradicted, missing = contradictions(evidence), unsaid(evidence)
+    counts = count_claims(evidence.claims)
     lines = [
+        *([f"Of {len(evidence.claims)} claims of the paper "
+           f"{'; '.join(f'{count} {words}' for count, words in counts.values())}."] if counts else []),
         *(f"{topic.title}: {topic.answer}" for topic in evidence.topics),
         f"\n{path} ({path.stat().st_size / 1e6:.1f} MB, from {files} run and table files) in {ended - started:.0f} s.",
         f"Beside it: {', '.join(file.name for file in beside)}.",
@@ -79,7 +83,8 @@ def make_report(out: Path, depth: str) -> Answer:
     if missing and not failed:
         lines.append(f"No page of the report says: {', '.join(missing)}.")
     answers = {topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics}
-    facts = {"page": path, "beside": beside, "files": files, "seconds": took, "answers": answers,
+    claims = {claim.key: {"outcome": claim.outcome, "answer": claim.answer} for claim in evidence.claims}
+    facts = {"page": path, "claims": claims, "beside": beside, "files": files, "seconds": took, "answers": answers,
              "contradictions": contradicted, "failed": failed, "unsaid": missing}
     if failed or contradicted or missing:
         return Answer(facts, lines, 1)

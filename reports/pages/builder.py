@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from itertools import groupby
 from posixpath import dirname, relpath
@@ -18,26 +18,40 @@ from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, is_number
-from reports.pages.first import answer, facts
+from reports.pages.first import answer, count_claims, facts
 from reports.pages.formulas import formula, prose
 from reports.pages.matrix import matrices, worst_first
 from reports.pages.records import Evidence, anchor, runs_by_user
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import explained
-from verification.claims.peg import FULL
-from verification.finding import REFUTED, REPRODUCED, VERDICTS, Finding, Part
+from verification.claims.conditions import Condition
+from verification.claims.peg import ALL_THREE
+from verification.finding import (
+    BEYOND,
+    IN_WORDS,
+    KINDS,
+    MISPRINT,
+    MIXED,
+    REFUTED,
+    REPRODUCED,
+    VERDICTS,
+    Finding,
+    Part,
+)
 from verification.scenes.measures import COORDINATES
 from verification.table import Table
 
 FIRST_PAGE = "report.html"
 # Largest number of table rows, or runs of a claim, on a page, to keep it small; the files beside it have all of them.
 ROWS_SHOWN = 200
-# The mark of each outcome; marks differ in shape as well as in colour.
-OUTCOME_MARKS = dict(zip(VERDICTS, ("✓", "◐", "≈", "✕", "○", "…"), strict=True))
-OUTCOME_CLASSES = dict(zip(VERDICTS, ("good", "where", "limited", "bad", "open", "absent"), strict=True))
-# The words for the same outcomes of a check that is not a claim of the paper.
-_WORDS = ("holds", "holds where stated", "mixed", "fails", "cannot tell", "not computed")
-FINDINGS = dict(zip(VERDICTS, _WORDS, strict=True))
+# The mark of each verdict, of each kind of outcome of a claim, and of the parts that decide nothing. Marks differ in
+# shape as well as in colour.
+OUTCOMES = (*VERDICTS, *KINDS, MISPRINT, BEYOND)
+OUTCOME_MARKS = dict(zip(OUTCOMES, "✓◐≈✕○…" + "✓✓◐≈✕○…" + "≠·", strict=True))
+OUTCOME_CLASSES = dict(zip(OUTCOMES, (
+    "good", "where", "limited", "bad", "open", "absent", "good", "good", "where", "limited", "bad", "open", "absent",
+    "limited", "open"), strict=True))  # fmt: skip
+FINDINGS = IN_WORDS | {MIXED: "mixed"}  # the words for the verdicts of a check that is not a claim of the paper
 
 
 def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dict[str, str]:
@@ -61,9 +75,8 @@ def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dic
         "used": {user for entry in evidence.manifest for user in entry.used_by},
     }  # fmt: skip
     first = environment.get_template("first.html.j2").render(
-        shared, answer=answer(evidence), facts=facts(evidence), counts=count_verdicts(evidence.claims),
+        shared, answer=answer(evidence), facts=facts(evidence), counts=count_claims(evidence.claims),
         first_map=first_map(evidence.claims),
-        part_counts=count_verdicts(part for claim in evidence.claims for part in claim.parts),
     )  # fmt: skip
     maps = {claim.key: map_of(claim) for claim in evidence.claims}
     layout = environment.get_template("section.html.j2")
@@ -101,10 +114,6 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     return {**scenes, **tables, **evidence.inputs}
 
 
-def count_verdicts(found: Iterable[Finding | Part]) -> dict[str, int]:
-    """Return the number of findings or parts for each verdict that occurs."""
-    given = [one.verdict for one in found]
-    return {verdict: given.count(verdict) for verdict in VERDICTS if verdict in given}
 
 
 def map_of(claim: Finding) -> Figure | None:
@@ -119,17 +128,21 @@ def map_of(claim: Finding) -> Figure | None:
 def first_map(claims: Sequence[Finding]) -> Figure | None:
     """Return the first page's map of where C10 holds, start by start on the full grid; None if not computed."""
     table = next((claim.tables.get(claim.key) for claim in claims if claim.key == "C10"), None)
-    grid = table.where(threshold=FULL) if table and "threshold" in table.keys else None
-    if grid is None or not grid.rows:
+    parts = (*COORDINATES, ALL_THREE)
+    if table is None or "part" not in table.keys:
         return None
-    counts = [f"{shown.holds.count(True)} of {len(shown.rows) - shown.holds.count(None)} in {coordinate}"
-              for coordinate in COORDINATES for shown in [grid.where(coordinate=coordinate)]]
+    grid = table.where(friction=0.0, travel=Condition().travel)
+    grid = grid.only(part in parts for part in grid["part"])
+    if not grid.rows:
+        return None
+    counts = [f"{sum(shown.decided)} of {len(shown.decided)} {'' if part == ALL_THREE else 'in '}{part}"
+              for part in parts for shown in [grid.where(part=part)]]
     caption = (
         "Each mark is one start of the peg, simulated in four worlds. A dot: the hand in IAPB is closest to that in "
-        f"the ideal world. A cross: PB or CBuc is closer. IAPB is closest in {', '.join(counts)}, mostly at small "
-        "tilts. The picture above starts at a tilt of 0.015 rad, the largest of that region."
+        "the ideal world. A cross: PB or CBuc is closer. A ring: the difference is smaller than the ideal world's own "
+        f"error. IAPB is closest in {', '.join(counts)} (x, y and theta in the kinetic metric)."
     )
-    return condition_map("where-c10", "Where IAPB is the closest", caption, grid, "tilt", "clearance", "coordinate",
+    return condition_map("where-c10", "Where IAPB is the closest", caption, grid, "tilt", "clearance", "part",
                          ranked=True)
 
 

@@ -12,14 +12,20 @@ from typing import NamedTuple
 
 from reports.pages.quantities import PEG_STEP, peg_step
 from reports.pages.records import Evidence
-from verification.claims.peg import LARGE
-from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding
+from verification.claims.conditions import Condition
+from verification.claims.peg import ALL_THREE, IN_WORDS, LARGE, closest_at, small_tilts
+from verification.finding import KINDS, MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
     "The energy loss in (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. Impulses by (13) "
     "and (14) do not conserve momentum. The printed formula can gain energy by rounding."
 )
 LIMIT = "This does not hold for springs and time stepping: see what we miss."
+# What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
+COUNTED = dict(zip(KINDS, (
+    "hold{s}", "hold{s}, with a misprint in the printed formula", "hold{s} in a stated range of conditions",
+    "hold{s} in part and fail{s} in a named quantity", "fail{s}", "cannot be decided here", "not computed",
+), strict=True))
 MISSES_SHOWN = 5
 # Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
 GRAVEST = ("exact-energy", "hard-cases", "engines", "scene-ledger", "complementarity", "stability", "mechanics")
@@ -39,6 +45,13 @@ class Answer(NamedTuple):
 
     holds: str
     fails: str
+
+
+def count_claims(claims: Sequence[Finding]) -> dict[str, tuple[int, str]]:
+    """Return the number of claims of each kind of outcome that occurs, and what the kind means, by kind."""
+    kinds = [claim.kind for claim in claims]
+    return {kind: (kinds.count(kind), words.format(s="s" if kinds.count(kind) == 1 else ""))
+            for kind, words in COUNTED.items() if kind in kinds}  # fmt: skip
 
 
 def answer(evidence: Evidence) -> Answer:
@@ -63,19 +76,24 @@ def _forces(claim: Finding | None) -> Iterator[tuple[bool, str]]:
 
 
 def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
-    if claim is None:
+    """Yield how often the path is the closest: judged by position and rotation together, and counted for each."""
+    parts = {part.name: part for part in claim.parts if not part.role} if claim else {}
+    if (whole := parts.pop(ALL_THREE, None)) is None:
         return
-    tilts = [bound for part in claim.parts if part.region and not part.name.startswith("theta")
-             for name, _, _, bound in part.region.bounds if name == "tilt" and bound is not None]  # fmt: skip
-    if tilts:
-        yield True, ("With impulses (IAPB), the path of the hand is closer to that at a rigid wall than with springs "
-                     "alone (PB) or with rigid contacts and a unilateral coupling of device and tool (CBuc), if the "
-                     f"peg starts with a tilt of at most {degrees(min(tilts)):.1f}°.")  # fmt: skip
-        yield False, "For larger tilts, the path with springs alone is often as close or closer."
-    elif claim.parts:
-        yield False, "In no range of starts is the path of the hand with impulses the closest to that at a rigid wall."
-    if any(part.verdict == REFUTED and part.name.startswith("theta") for part in claim.parts):
-        yield False, "In rotation, the path with impulses is usually not the closest."
+    where = f", and always where {whole.region}" if whole.region else ""
+    each = ", ".join(f"{part.held} of {part.decided} in {part.named or name}" for name, part in parts.items())
+    said = (
+        "With impulses (IAPB), the path of the hand is closer to that at a rigid wall than with springs alone (PB) and "
+        "with rigid contacts and a unilateral coupling of device and tool (CBuc) in "
+        f"{whole.held} of the {whole.decided} starts that can tell, if position and rotation count together{where} "
+        f"({each})."
+    )
+    if claim and (table := claim.tables.get(claim.key)):
+        found = closest_at(table, small_tilts(table))
+        held, decided = found.pop(ALL_THREE)
+        each = ", ".join(f"{ahead} of {told} in {IN_WORDS[name]}" for name, (ahead, told) in found.items())
+        said += f" At tilts up to {degrees(Condition().tilt):.1f}° it is in {held} of {decided} ({each})."
+    yield whole.verdict in (REPRODUCED, WHERE), said
 
 
 def facts(evidence: Evidence) -> tuple[Fact, ...]:

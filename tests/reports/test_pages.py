@@ -28,8 +28,10 @@ from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
 from tests.reports.joined import joined
 from verification.claims import CLAIMS
 from verification.claims.conditions import FULL_GRID
-from verification.claims.peg import FULL, LARGE
+from verification.claims.peg import ALL_THREE, LARGE
 from verification.finding import (
+    BEYOND,
+    MISPRINT,
     MIXED,
     NOT_COMPUTED,
     QUANTITIES,
@@ -146,7 +148,8 @@ def test_what_was_not_computed_is_said() -> None:
 
 def test_the_pages_say_what_the_records_say_escaped_counted_and_with_their_sources() -> None:
     page = " ".join(joined(EVIDENCE).split())
-    for text in ("KE never rises &lt;b&gt;", "<mfrac>", f"1 {MIXED}", f"1 {REFUTED}", "Asked &lt;here&gt;.",
+    for text in ("KE never rises &lt;b&gt;", "<mfrac>", "1 holds in part and fails in a named quantity", "1 fails<",
+                 "Fails in some trials.", "Asked &lt;here&gt;.",
                  "It holds to 10<sup>−14</sup>.", "<summary>Trees</summary>", "<code>assert gain &lt;= 0</code>",
                  '<th scope="row">e</th><td><code>0.5</code>', "[[1]]", '<a href="manifest.html#runs-C10">3 runs</a>',
                  "keeps no runs", "<code>tables/claims-1.h5</code>", "<code>tables/hard cases-1.h5</code>"):
@@ -235,22 +238,25 @@ def test_each_page_lists_the_terms_that_it_uses_and_no_others(pages: dict[str, s
 
 def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_topic_with_an_answer() -> None:
     held = [Part("s.", REPRODUCED, f"part {n}", 5, 5) for n in range(9)]
-    worst = Part("s.", REFUTED, "the one that fails", 1, 40, 7)
+    worst = Part("s.", REFUTED, "the one that fails", 1, 40, 7, named="a quantity")
+    printed, ours = Part("s.", REFUTED, "formula", role=MISPRINT), Part("s.", REFUTED, "more", role=BEYOND)
     where = Part("s.", WHERE, "part in a region", 30, 40, region=Region((("tilt", "rad", None, 0.015),), share=0.05))
     topics = (one("mechanics", Part("a", REPRODUCED), Part("b", REFUTED), said="Most hold."), one("engines", said=""))
-    page = joined(Evidence(claims=(one("C20", *held, where, worst),), topics=topics), ())
+    page = joined(Evidence(claims=(one("C20", *held, where, worst, printed, ours),), topics=topics), ())
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert all(part.name in first for part in held) and "Most hold." in first and "engines" not in first
-    assert "reproduced where tilt ≤ 0.015 rad" in first and "30 of 40; the region is 5% of the tested range" in first
+    assert "holds where tilt ≤ 0.015 rad" in first and "30 of 40; the region is 5% of the tested range" in first
+    assert "fails, as printed" in first and "fails (beyond the paper)" in first and "Fails in a quantity." in first
     line = first.split(">the one that fails")[1].split("</li>")[0]
-    assert "refuted" in line and "1 of 40, 7 cannot tell" in line and "1 refuted" in page.split("11 parts:")[1]
+    assert ">fails<" in line and "1 of 40, 7 cannot tell" in line
+    assert "1 holds in part and fails in a named quantity" in page.split("1 claims:")[1]
     assert badge_words(topics[0]) == "1 of 2 findings fail" and badge_words(one("p", Part("a", REFUTED))) == "fails"
 
 
 def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None:
     claim = CLAIMS["C10"]
     near, far = {"IAPB": 1e-5, "PB": 1e-4, "CBuc": 1e-4}, {"IAPB": 1e-3, "PB": 1e-4, "CBuc": 1e-4}
-    rows = [start.row() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "threshold": FULL}
+    rows = [start.row() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "part": "x"}
             for start in FULL_GRID]  # fmt: skip
     found = claim.conclude(claim.table_of(rows))
     pile = dict.fromkeys(("share that agrees", "time of (21)", "time of pushing"), 10.0)
@@ -261,22 +267,24 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     page = joined(Evidence(claims=(found,), topics=(topic,)))
     assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
     assert "agreed with complementarity has 14" in page and f"agrees to {prose('3e-04')}" in page
-    fewer = replace(found, tables={"C10": found.tables["C10"].where(threshold="none")})
+    fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
 
 
 def test_the_answer_is_made_from_the_claims() -> None:
     rows = ((LARGE, "x", 10.0, 1.0), (LARGE, "y", 6.0, 2.0), (LARGE, "x", 8.0, 1.0), (LARGE, "theta", 1.0, 1.0))
     forces = one("C11", tables={"C11": titled(("part", "coordinate", "IAPB", "PB"), rows)})
-    near, wide = (Region((("tilt", "rad", None, tilt),), share=0.05) for tilt in (0.015, 0.03))
-    path = one("C10", Part("s.", WHERE, "x", 9, 40, region=near), Part("s.", REFUTED, "theta, there", 1, 40),
-               Part("s.", WHERE, "y", 12, 40, region=wide))  # fmt: skip
+    near = Region((("tilt", "rad", None, 0.015),), share=0.05)
+    x, turned = Part("s.", REPRODUCED, "x", 40, 40), Part("s.", REFUTED, "theta", 1, 40, named="rotation")
+    ours = Part("s.", REFUTED, "x, larger", 0, 9, role=BEYOND)
+    path = one("C10", x, turned, ours, Part("s.", WHERE, ALL_THREE, 12, 30, region=near))
     said = answer(Evidence(claims=(path, forces)))
     assert "8 times as large" in said.holds and "median of 3 cases" in said.holds  # 10, 3 and 8
-    assert "a tilt of at most 0.9°" in said.holds and "gained" not in said.holds
-    assert "For larger tilts" in said.fails and "In rotation, the path with impulses is usually not" in said.fails
-    said = answer(Evidence(claims=(one("C10", Part("s.", REPRODUCED, "x", 9, 40)),)))
-    assert said.fails.startswith("In no range of starts") and "rotation" not in said.fails and said.holds == ""
+    for text in ("in 12 of the 30 starts", "always where tilt <= 0.015 rad", "(40 of 40 in x, 1 of 40 in rot"):
+        assert text in said.holds
+    assert "gained" not in said.holds and "of 9" not in said.holds and said.fails == ""
+    said = answer(Evidence(claims=(one("C10", x, Part("s.", REFUTED, ALL_THREE, 1, 30)),)))
+    assert "in 1 of the 30 starts" in said.fails and said.holds == ""  # x alone does not decide
 
 
 def test_the_facts_name_our_own_misses_the_gravest_first() -> None:

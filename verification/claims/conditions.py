@@ -100,9 +100,8 @@ def start_conditions(depth: str) -> tuple[Condition, ...]:
     return tuple(dict.fromkeys(grid + travels + frictions + approaches))
 
 
-# Every tilt and clearance of the full depth, at the paper's approach velocity, and those with evenly spaced tilts.
+# Every tilt and clearance of the full depth, at the paper's approach velocity.
 FULL_GRID = tuple(Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"])
-EVEN_GRID = tuple(start for start in FULL_GRID if start.tilt in EVEN_TILTS)
 
 
 def limited_conditions(depth: str) -> tuple[Condition, ...]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verification.check import Check, Study
+from verification.finding import BEYOND
 from verification.mechanics.false_collisions import EDGE_JUMP, count_false, socket
 from verification.region import Region
 from verification.table import Row, Table
@@ -108,6 +109,7 @@ C18 = Check(
     tolerance="No false collision remains. A trial cannot tell if its coherence distance is not above speed × step, "
     "because the paper requires this.",
     cases=_cases, row=_row, holds=_holds, says=_says, draw=_draw, parts=["part"],
+    roles={CLUSTERING: BEYOND}, named={SHORT: "coherence distances short of the next facet"},
     conditions=["cluster_distance", "coherence_distance", "damping", "rate"],
     axes=("cluster_distance", "coherence_distance", "damping"),
 )  # fmt: skip

@@ -36,10 +36,11 @@ def last_rows_only(mass, rows, velocity, e, **options):
 
 
 def test_the_algebraic_claims_of_the_engine():
-    """Theorems 1 and 2 fail only in the printed factor."""
+    """Theorems 1 and 2 hold; the printed factor is wrong."""
     for found in check_claims(ids=["C01", "C02", "C03", "C04", "C05"]):
         wrong = {algebraic.AS_PRINTED} if found.key in ("C01", "C02") else set()
         assert {part.name for part in found.parts if part.verdict != REPRODUCED} == wrong
+        assert found.outcome == ("holds, misprint" if wrong else "holds") and found.verdict == REPRODUCED
 
 
 @pytest.mark.parametrize("fault", [energetic, lossy])

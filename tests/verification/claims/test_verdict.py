@@ -7,7 +7,14 @@ import pytest
 
 from verification.check import Check
 from verification.finding import (
+    BEYOND,
+    FAILS,
+    FAILS_IN,
+    HOLDS,
+    KINDS,
     LEAST_DECIDED,
+    MISPRINT,
+    MISPRINTED,
     MIXED,
     NOT_COMPUTED,
     NOT_TESTABLE,
@@ -15,9 +22,12 @@ from verification.finding import (
     REPRODUCED,
     WHERE,
     Part,
+    failure_of,
+    finding_of,
     judge_part,
     verdict_of,
     verdict_of_trials,
+    with_failures,
 )
 from verification.region import LEAST_CONFIRMING, search_region
 from verification.table import table_from
@@ -52,6 +62,33 @@ def test_a_finding_is_never_better_than_its_worst_part(verdicts, verdict):
 def test_only_an_optional_part_that_is_absent_is_left_out(part, verdict):
     assert verdict_of([Part("", REPRODUCED), part]) == verdict
     assert verdict_of([Part("", NOT_TESTABLE, optional=True)]) == NOT_TESTABLE
+
+
+@pytest.mark.parametrize(("parts", "outcome", "kind"), [
+    ([(REPRODUCED, ""), (REFUTED, MISPRINT), (REFUTED, BEYOND)], "holds, misprint", MISPRINTED),
+    ([(REPRODUCED, ""), (REFUTED, BEYOND)], "holds", HOLDS), ([(REFUTED, BEYOND)], "not computed", "not computed"),
+    ([(WHERE, ""), (REFUTED, MISPRINT)], "holds where stated", "holds where stated"),
+    ([(WHERE, ""), (REFUTED, "")], "fails in rotation", FAILS_IN),
+    ([(REFUTED, ""), (REPRODUCED, BEYOND)], FAILS, FAILS),
+    ([(REPRODUCED, ""), (MIXED, "")], "fails in some trials in rotation", FAILS_IN),
+    ([(REFUTED, ""), (MIXED, ""), (REPRODUCED, "")], "fails in x, and in some trials in rotation", FAILS_IN),
+    ([(MIXED, "")], "fails in some trials", FAILS_IN),
+    ([(REPRODUCED, ""), (NOT_TESTABLE, "")], "cannot tell", "cannot tell"),
+])  # fmt: skip
+def test_the_outcome_of_a_claim_follows_from_the_parts_that_the_paper_states(parts, outcome, kind):
+    named = ("x", "rotation", "y")
+    found = finding_of("C", "C", "", "", [Part("", verdict, role=role, named=name)
+                                          for name, (verdict, role) in zip(named, parts, strict=False)])  # fmt: skip
+    assert (found.outcome, found.kind) == (outcome, kind) and kind in KINDS
+    added = with_failures(found, [failure_of("one", ValueError("planted"))])
+    assert added.outcome == (outcome if FAILS in outcome else "not computed")
+
+
+def test_a_part_gets_its_role_and_its_words_from_the_check():
+    claim = replace(CLAIM, roles={"x": BEYOND}, named={"y": "rotation"})
+    x, y = claim.conclude(claim.table_of([{"part": "x", "error": 2.0}, {"part": "y", "error": 2.0}])).parts
+    assert (x.role, x.named, y.role, y.named) == (BEYOND, "", "", "rotation")
+    assert x.outcome == "fails (beyond the paper)" and y.outcome == "fails"
 
 
 CLAIM = Check(key="C99", question="?", cases=lambda study: (), row=lambda study, case: case, parts=["part"],
@@ -133,7 +170,7 @@ def drawn_by(holds, count=20):
 
 def test_a_region_that_is_there_is_found_and_confirmed_with_its_counts():
     part = judge_part("x", trials(gentle), drawn_by(gentle))
-    assert part.outcome == "reproduced where tilt <= 0.2 rad"
+    assert part.outcome == "holds where tilt <= 0.2 rad"
     assert part.region.share == pytest.approx(2 / 3) and part.region.fresh == 20
     assert part.region.searched + part.region.others == part.held
     assert "67% of the tested range" in part.sentence

@@ -10,8 +10,8 @@ from verification.scenes.measures import (
     bounces,
     comparison_window,
     corner_gaps,
+    force_distance,
     largest_distance,
-    momentum_distance,
     peak_force,
     resting_force,
     root_mean_square,
@@ -61,10 +61,10 @@ def test_settling_counts_from_the_first_contact():
     assert settling_time(trace(velocity=FOREVER)) is None
 
 
-def test_a_spike_one_step_later_is_a_small_difference_of_momentum():
+def test_a_spike_one_step_later_counts_by_its_impulse_and_not_by_its_square():
     early, late = column(np.eye(1, STEPS, 30)[0] * 60.0, 0), column(np.eye(1, STEPS, 31)[0] * 60.0, 0)
-    distance = momentum_distance(trace(force=late), trace(force=early), slice(0, STEPS))
-    assert distance[0] == pytest.approx(60.0 * DT / np.sqrt(STEPS))
+    mean, rms = (force_distance(trace(force=late), trace(force=early), slice(0, STEPS), order)[0] for order in (1, 2))
+    assert mean == pytest.approx(2 * 60.0 / STEPS) and rms == pytest.approx(60.0 * np.sqrt(2 / STEPS))
     assert peak_force(trace(force=late))[0] == 60.0
 
 
