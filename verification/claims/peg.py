@@ -88,8 +88,7 @@ def peg_claim(key: str, question: str, *, limited: bool = False, **words: Any) -
     def draw(study: Study, region: Region) -> list[Condition]:
         return drawn(cases(study), region, study.seed, FRESH)
 
-    common: dict[str, Any] = {"cases": cases, "draw": draw, "conditions": tuple(UNITS),
-                              "named": IN_WORDS}  # fmt: skip
+    common: dict[str, Any] = {"cases": cases, "draw": draw, "conditions": tuple(UNITS), "named": IN_WORDS}
     return Check(key=key, question=question, **common | words)
 
 
@@ -162,11 +161,12 @@ def _trajectory_says(table: Table) -> str:
     def counts(tilts: Iterable[float]) -> str:
         return ", ".join(f"{held}/{decided} ({name})" for name, (held, decided) in closest_at(table, tilts).items())
 
+    papers = table.only(part in IN_WORDS for part in table["part"])
     return (
         f"IAPB is closest in {counts(table['tilt'])} of the starts that can tell; together means x, y and theta in the "
         f"kinetic metric. It depends on the tilt: up to {Condition().tilt:g} rad {counts(small_tilts(table))}; at the "
         f"evenly spaced tilts {counts(EVEN_TILTS)}. The distance of IAPB to ideal, divided by that of PB, has these "
-        f"medians: {_ratios_to_pb(table)}."
+        f"medians: {_ratios_to_pb(papers)}."
     )
 
 
