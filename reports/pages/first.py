@@ -92,7 +92,7 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
         found = closest_at(table, small_tilts(table))
         held, decided = found.pop(ALL_THREE)
         each = ", ".join(f"{ahead} of {told} in {IN_WORDS[name]}" for name, (ahead, told) in found.items())
-        said += f" At tilts up to {degrees(Condition().tilt):.1f}° it is in {held} of {decided} ({each})."
+        said += f" At tilts up to {degrees(Condition().tilt):.1f}° it is the closest in {held} of {decided} ({each})."
     yield whole.verdict in (REPRODUCED, WHERE), said
 
 
