@@ -13,7 +13,7 @@ from typing import NamedTuple
 from reports.pages.quantities import PEG_STEP, peg_step
 from reports.pages.records import Evidence
 from verification.claims.conditions import Condition
-from verification.claims.peg import ALL_THREE, IN_WORDS, LARGE, closest_at, small_tilts
+from verification.claims.peg import ALL_THREE, LARGE, NAMED, closest_at, small_tilts
 from verification.finding import KINDS, MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
@@ -91,7 +91,7 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     if claim and (table := claim.tables.get(claim.key)):
         found = closest_at(table, small_tilts(table))
         held, decided = found.pop(ALL_THREE)
-        each = ", ".join(f"{ahead} of {told} in {IN_WORDS[name]}" for name, (ahead, told) in found.items())
+        each = ", ".join(f"{ahead} of {told} in {NAMED[name]}" for name, (ahead, told) in found.items())
         said += f" At tilts up to {degrees(Condition().tilt):.1f}° it is the closest in {held} of {decided} ({each})."
     yield whole.verdict in (REPRODUCED, WHERE), said
 

@@ -52,7 +52,7 @@ ALL_THREE = "together"
 ARM = 0.05  # [m] √(inertia / mass) of the peg: the length of (x, y, θ) in the kinetic metric is √(x² + y² + (ARM θ)²)
 RESOLVED = {"x": 2.5e-5, "y": 5e-5, "theta": 5e-3}
 RESOLVED[ALL_THREE] = float(np.linalg.norm([RESOLVED["x"], RESOLVED["y"], ARM * RESOLVED["theta"]]))
-IN_WORDS = {"x": "x", "y": "y", "theta": "rotation", ALL_THREE: "all three together"}
+NAMED = {"x": "x", "y": "y", "theta": "rotation", ALL_THREE: "all three together"}
 LIMITED = (*START, "force_limit")
 CANNOT_TELL = (
     "A trial cannot tell if IAPB and the nearer of the others differ by less than the ideal world's own error of "
@@ -88,7 +88,7 @@ def peg_claim(key: str, question: str, *, limited: bool = False, **words: Any) -
     def draw(study: Study, region: Region) -> list[Condition]:
         return drawn(cases(study), region, study.seed, FRESH)
 
-    common: dict[str, Any] = {"cases": cases, "draw": draw, "conditions": tuple(UNITS), "named": IN_WORDS}
+    common: dict[str, Any] = {"cases": cases, "draw": draw, "conditions": tuple(UNITS), "named": NAMED}
     return Check(key=key, question=question, **common | words)
 
 
@@ -161,7 +161,7 @@ def _trajectory_says(table: Table) -> str:
     def counts(tilts: Iterable[float]) -> str:
         return ", ".join(f"{held}/{decided} ({name})" for name, (held, decided) in closest_at(table, tilts).items())
 
-    papers = table.only(part in IN_WORDS for part in table["part"])
+    papers = table.only(part in NAMED for part in table["part"])
     return (
         f"IAPB is closest in {counts(table['tilt'])} of the starts that can tell; together means x, y and theta in the "
         f"kinetic metric. It depends on the tilt: up to {Condition().tilt:g} rad {counts(small_tilts(table))}; at the "
