@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
+
+from iapb.errors import harmless
 
 _listening: list[bool] = []  # not empty: a listener reports already
 BEGIN = "Compiling kernels (seconds to a minute or two); they are cached for the next time ..."
@@ -34,8 +36,9 @@ def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
 
 
 def to_stderr(line: str) -> None:
-    """Write a line to stderr now."""
-    print(line, file=sys.stderr, flush=True)
+    """Write a line to stderr now, if it can be written; what would give a terminal orders is escaped."""
+    with suppress(OSError):
+        print(harmless(line), file=sys.stderr, flush=True)
 
 
 def tell_from_worker(told: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copyreg
 import pickle
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,15 @@ def shown(value: Any) -> str:
     """Return a short one-line rendering of a value for an error message."""
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
+
+
+# Terminal control characters, and characters without a width or that change the direction of text; not tabs, line ends.
+_ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff]")
+
+
+def harmless(text: str) -> str:
+    """Return a text in which every terminal control character is escaped."""
+    return _ORDERS.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 class IapbError(Exception):

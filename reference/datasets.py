@@ -31,7 +31,7 @@ from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from iapb.lazy import needed
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
-from reference.hdf5 import leads_out
+from reference.hdf5 import Budget, check_items, check_size, read_dataset
 
 LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
 LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only
@@ -64,12 +64,13 @@ class StoredProblem:
     remark: str = ""  #: text in the file
 
 
-def read_problem(path: Path | str) -> StoredProblem:
+def read_problem(path: Path | str, budget: int | None = None) -> StoredProblem:
     """Read a problem file of any known format: .lcp.gz or .lcp, .dat, .txt (MLCP), .hdf5 or .h5 (FCLIB).
 
     Parameters
     ----------
     path : path of the file; the ending of its name decides the format
+    budget : bytes that the values of an FCLIB file may fill, by default `reference.hdf5.READ_BUDGET`
 
     Raises
     ------
@@ -79,11 +80,13 @@ def read_problem(path: Path | str) -> StoredProblem:
         The file is an FCLIB problem, and h5py is not installed.
     """
     path = Path(path)
-    readers = [reader for ending, reader in _READERS.items() if path.name.lower().endswith(ending)]
+    readers: list[Any] = [reader for ending, reader in _READERS.items() if path.name.lower().endswith(ending)]
     if not readers:
         raise DatasetError(path, f"unknown kind of file; known are {', '.join(_READERS)}")
     try:
-        return readers[0](path)
+        if path.exists() and not path.is_file():
+            raise ValueError("no regular file")  # a pipe would be waited for
+        return _fclib(path, budget) if readers[0] is _fclib else readers[0](path)
     except MissingDependencyError:
         raise
     except Exception as error:  # a damaged or foreign file can raise any exception
@@ -152,33 +155,37 @@ def _mlcp(path: Path) -> StoredProblem:
     return StoredProblem(problem, np.array(words["lambda"], np.float64), remark)
 
 
-def _fclib(path: Path) -> StoredProblem:
+def _fclib(path: Path, allowed: int | None) -> StoredProblem:
     with needed("h5py", "FCLIB files").File(path, "r") as file:
-        if outside := leads_out(file):
-            raise ValueError(f"{outside}: expected a file without links to other files")
+        check_items(file)
+        budget = Budget(path, file, allowed)
         kind = "fclib_local" if "fclib_local" in file else "fclib_global"
         group = file[kind]
-        given: dict[str, Any] = {"restitution": 0.0, "friction": _numbers(group, "vectors/mu"), "name": path.name,
-                 "contact_size": index(_numbers(group, "spacedim", None).item())}  # fmt: skip
+        given: dict[str, Any] = {
+            "restitution": 0.0, "friction": _numbers(budget, group, "vectors/mu"), "name": path.name,
+            "contact_size": index(_numbers(budget, group, "spacedim", None).item())}  # fmt: skip
         if given["contact_size"] not in (2, 3):
             raise ValueError(f"spacedim {given['contact_size']}: expected 2 or 3")
         if kind == "fclib_global":
-            problem = _condensed(group, given)
+            problem = _condensed(budget, group, given)
         else:
-            w = _matrix(group["W"], LARGEST_SIZE).toarray()
-            problem = ImpactProblem.from_delassus(w, _numbers(group, "vectors/q"), **given)
-        r = _numbers(file, "solution/r") if "solution/r" in file else np.zeros(0)
+            w = _matrix(budget, group["W"], LARGEST_SIZE).toarray()
+            problem = ImpactProblem.from_delassus(w, _numbers(budget, group, "vectors/q"), **given)
+        r = _numbers(budget, file, "solution/r") if "solution/r" in file else np.zeros(0)
         stored = r if r.any() and len(r) == problem.size else None  # zeros are a placeholder, not a solution
-        title = bytes(group["info/title"][()]) if "info/title" in group else b""
-        return StoredProblem(problem, stored, " ".join(title.decode("utf-8", "replace").rstrip("\0").split()))
+        title = ""
+        if "info/title" in group:
+            check_size(group["info/title"], budget)
+            title = bytes(group["info/title"][()]).decode("utf-8", "replace").rstrip("\0")
+        return StoredProblem(problem, stored, " ".join(title.split()))
 
 
-def _condensed(group: Any, given: dict[str, Any]) -> ImpactProblem:
+def _condensed(budget: Budget, group: Any, given: dict[str, Any]) -> ImpactProblem:
     """Return a global problem with only its contacts as unknowns."""
     from scipy.sparse.linalg import splu
 
-    mass, h = _matrix(group["M"], LARGEST_MATRIX), _matrix(group["H"], LARGEST_MATRIX)
-    f, w = _numbers(group, "vectors/f"), _numbers(group, "vectors/w")
+    mass, h = _matrix(budget, group["M"], LARGEST_MATRIX), _matrix(budget, group["H"], LARGEST_MATRIX)
+    f, w = _numbers(budget, group, "vectors/f"), _numbers(budget, group, "vectors/w")
     if len(w) > LARGEST_SIZE or h.shape != (len(f), len(w)):
         raise ValueError(f"H {h.shape}, f {f.shape}, w {w.shape}: expected at most {LARGEST_SIZE} unknowns")
     factors = splu(mass)
@@ -191,20 +198,20 @@ def _condensed(group: Any, given: dict[str, Any]) -> ImpactProblem:
     return ImpactProblem.from_delassus(delassus, h.T @ free + w, **given)
 
 
-def _numbers(group: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
+def _numbers(budget: Budget, group: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
     """Return a dataset of numbers as a vector; its header is checked before it is read."""
     dataset = group[name]
     if dataset.dtype.kind not in "iuf" or dataset.size > LARGEST_SIZE**2:
         raise ValueError(f"{name}: {dataset.dtype}, {dataset.shape}: expected at most {LARGEST_SIZE**2} numbers")
-    return np.asarray(dataset[()], dtype).ravel()
+    return np.asarray(read_dataset(dataset, budget), dtype).ravel()
 
 
-def _matrix(group: Any, most: int) -> Any:
+def _matrix(budget: Budget, group: Any, most: int) -> Any:
     """Return a CXSparse matrix as a sparse matrix of compressed columns."""
     from scipy import sparse
 
-    m, n, nz = (index(_numbers(group, key, None).item()) for key in ("m", "n", "nz"))
-    i, p, x = _numbers(group, "i", None), _numbers(group, "p", None), _numbers(group, "x")
+    m, n, nz = (index(_numbers(budget, group, key, None).item()) for key in ("m", "n", "nz"))
+    i, p, x = _numbers(budget, group, "i", None), _numbers(budget, group, "p", None), _numbers(budget, group, "x")
     if not (0 <= m <= most and 0 <= n <= most):
         raise ValueError(f"{group.name} of {m} x {n}: expected at most {most} rows and columns")
     if nz in (_ROWS, _COLUMNS):

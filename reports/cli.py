@@ -8,7 +8,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import wraps
 from importlib import import_module
 from importlib.metadata import version
@@ -17,7 +17,7 @@ from typing import Any, cast
 
 import typer
 
-from iapb.errors import ArgumentError, IapbError
+from iapb.errors import ArgumentError, IapbError, RunFileError, harmless
 
 # command -> its line in `iapb --help`. The module of that name in reports.commands has a function with the same name.
 # Only the module of the given command is imported; `iapb --help` imports none.
@@ -93,14 +93,12 @@ def _answering(command: Callable[..., Any]) -> Callable[..., int]:
             answer = command(*arguments, **options)
         except KeyboardInterrupt:
             raise typer.Abort from None
-        print(answer.text(options.get("json_", False)))
+        print(harmless(answer.text(options.get("json_", False))), flush=True)  # colours of files do not pass, too
         return int(answer.status)
 
     return call
 
 
-# Terminal control characters and characters that reverse the direction of text; not tabs and line ends.
-_ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _COLOUR = re.compile(r"(\x1b\[[0-9;]*m)")  # colour sequences as rich prints them; they are harmless
 _BARS = re.compile(r"(\x1b\[(?:[0-9;]*m|[0-9]*[ABK]|\?25[hl])|\r)")
 
@@ -123,13 +121,26 @@ class Harmless:
     def write(self, text: str) -> int:
         """Write a text; return its length."""
         parts = self._kept.split(text) if self._stream.isatty() else [text]
-        self._stream.write("".join(part if i % 2 else harmless(part) for i, part in enumerate(parts)))
+        self._try(self._stream.write, "".join(part if i % 2 else harmless(part) for i, part in enumerate(parts)))
         return len(text)
 
+    def flush(self) -> None:
+        """Write what waits."""
+        self._try(self._stream.flush)
 
-def harmless(text: str) -> str:
-    """Return a text in which every terminal control character is escaped."""
-    return _ORDERS.sub(lambda found: ascii(found[0])[1:-1], text)
+    def _try(self, act: Callable[..., Any], *given: Any) -> None:
+        """Write; a stream that nobody reads any more swallows the rest, as does a stderr that is full."""
+        try:
+            act(*given)
+        except (OSError, ValueError) as error:
+            with suppress(OSError, ValueError):  # what waits is not tried again at the end of the process
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+            if self._stream is sys.__stdout__ and not isinstance(error, BrokenPipeError):
+                raise UnwritableError(f"standard output: {getattr(error, 'strerror', None) or error}") from error
+
+
+class UnwritableError(IapbError):
+    """Standard output is full: no error of the file that is read or written meanwhile."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -137,6 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
     not to be trusted, 130 interrupted."""
     if arguments is None:
         signal.signal(signal.SIGTERM, _end_politely)
+        _open_closed_streams()
     out, err = cast(Any, Harmless(sys.stdout, _COLOUR)), cast(Any, Harmless(sys.stderr, _BARS))
     with redirect_stdout(out), redirect_stderr(err):
         status = _status(sys.argv[1:] if arguments is None else arguments)
@@ -158,6 +170,8 @@ def _status(given: list[str]) -> int:
         if "--debug" in given:
             raise
         status, said = 1, str(error)
+        if isinstance(error, RunFileError):  # a file's name may hold line ends
+            said = "\\n".join(said.splitlines())
         if isinstance(error, OSError) and error.filename is not None and error.strerror:
             said = f"{error.filename}: {error.strerror}"
     except Exception as error:
@@ -171,6 +185,16 @@ def _status(given: list[str]) -> int:
     if "--json" in given:
         print(json.dumps({"error": said, "status": status}, indent=1, ensure_ascii=False))
     return status
+
+
+def _open_closed_streams() -> None:
+    """Give streams that the caller closed (``>&-``) a place: else the next file that is opened gets their number."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
+            setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
 def _end_politely(*_: object) -> None:

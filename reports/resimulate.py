@@ -12,16 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, RunFileError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.names import one_of
 from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.scene.model import scene_kind
+from iapb.scene.reading import scene_from_values
 from iapb.simulation import Simulation, simulate
 from iapb.worlds import find_world
 from reports.store.folder import Place
+from reports.store.io import refuse_foreign
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
 from reports.store.parts import read_head
 from reports.store.runs import read_run, store_run
@@ -84,7 +85,7 @@ def repeat_run(path: Path | str) -> Repetition:
 
 def scene_of(run: Run) -> Scene:
     """Return the scene of a run, from its resolved values."""
-    scene: Scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
+    scene = scene_from_values(run.scene_resolved)
     scene._source_text = run.scene_source
     return scene
 
@@ -115,8 +116,11 @@ def coupling_of(run: Run) -> Coupling:
 def _made(kind: Any, settings: Any) -> Any:
     """Return a law or coupling with those settings that it takes; the other ones only describe it."""
     names = {field.name for field in fields(kind) if field.init}
-    return kind(**{name: tuple(value) if isinstance(value, list) else value
-                   for name, value in settings.items() if name in names})  # fmt: skip
+    try:
+        return kind(**{name: tuple(value) if isinstance(value, list) else value
+                       for name, value in settings.items() if name in names})  # fmt: skip
+    except (TypeError, AttributeError) as error:  # settings of a file
+        raise ArgumentError("settings", settings, f"those of {kind.name}") from error
 
 
 def differences(stored: Run, again: Run) -> tuple[Change, ...]:
@@ -159,11 +163,16 @@ def recover(folder: Path) -> Path:
     head = read_head(folder)
     place = Place(str(head.get("key", "")), folder.with_suffix(""))
     pieces = joined(folder, Recorder(simulation_of(head)), str(head["world"]))
+    refuse_foreign(place.partial)
     store_run(place.partial, pieces, key=place.key, stopped="killed", replace=True)
     return place.partial
 
 
 def simulation_of(head: Mapping[str, Any]) -> Simulation:
     """Return the simulation of parts in its initial state."""
+    lacking = [name for name in ("scene_resolved", "scene_source", "world", "law", "law_settings", "coupling",
+                                 "coupling_settings") if name not in head]
+    if lacking:
+        raise RunFileError(f"the first part does not name {', '.join(lacking)}")
     run: Any = SimpleNamespace(**head)  # it has the names of a Run's
     return Simulation(scene_of(run), law_of(run), coupling_of(run))

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from iapb.compiling import compiling_told, to_stderr
+from iapb.errors import IapbError, harmless
 from reports.store.keys import plain
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ WIDTH = 80  # of the lines
 SILENCE = 30.0  # [s] between two lines of a log
 _WIDEST = 26  # of a column; longer texts go on in the next line
 _GAP = "  "  # between columns
+_LONGEST_ERROR = 400  # characters
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,17 @@ class Answer:
             finite = json.loads(json.dumps(plain(self.facts)), parse_constant=lambda _: None)
             return json.dumps(finite, indent=1, ensure_ascii=False)
         return "\n".join(line if isinstance(line, str) else table_text(line) for line in self.lines)
+
+
+def one_line(name: Any) -> str:
+    """Return a name, which may hold line ends, on one line."""
+    return "\\n".join(str(name).splitlines())
+
+
+def said(error: Exception, path: Any) -> str:
+    """Return on one line what an error says, without the path that begins it; foreign errors with their kind."""
+    kind = "" if isinstance(error, IapbError) else f"{type(error).__name__}: "
+    return kind + one_line(" ".join(str(error).removeprefix(f"{path}: ").split()))[:_LONGEST_ERROR]
 
 
 def sentence(text: str, mark: str = "") -> str:
@@ -130,9 +143,10 @@ def stage_progress(begun: str = "", transient: bool = False) -> Iterator[Callabl
     bars = Progress(name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console, transient=transient,
                     redirect_stdout=sys.stdout.isatty())  # fmt: skip
     with bars, compiling_told(bars.console.print):
-        tasks = {begun: bars.add_task(begun, total=None)} if begun else {}
+        tasks = {harmless(begun): bars.add_task(harmless(begun), total=None)} if begun else {}
 
         def progress(stage: str, done: int, total: int) -> None:
+            stage = harmless(stage)  # a scene's name
             if stage not in tasks:
                 tasks[stage] = bars.add_task(stage, total=total)
             bars.update(tasks[stage], completed=done, total=total)

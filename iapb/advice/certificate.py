@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,16 @@ from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.run import Run, digests
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
-from iapb.scene.model import Scene, scene_kind
+from iapb.scene.reading import scene_from_values
 
 Floats = NDArray[np.float64]
 
 EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
 _BATCH = 4096  # impacts whose mass matrices are in memory at once
+_STEPS = 1 << 16  # steps of a run that are in memory at once
+_PIECE, _ROWS = 1 << 26, 1 << 20  # bytes of its states, and rows of its contacts, likewise
+_INDEFINITE = 1e-12  # a negative eigenvalue of M beyond this share of the largest one is no rounding
 # In a correct record, M (v⁺ − v⁻) and Jᵀp of the recorded contacts equal the recorded impulse up to rounding.
 MOMENTUM_TOLERANCE = 1e-9
 # The resolver drops rows within 1e-10 of the span of others; their residual is √κ(M) times larger: 1e-6 at κ(M) = 1e8.
@@ -121,7 +125,10 @@ def _integers(values: ArrayLike) -> tuple[NDArray[np.object_], int]:
 
 def _finite(name: str, values: ArrayLike) -> Floats:
     """Return the values as a contiguous array of doubles."""
-    array = np.ascontiguousarray(values, np.float64)
+    given = np.asarray(values)
+    if given.dtype.kind not in "biuf" and given.size:
+        raise ArgumentError(name, given.dtype, "real numbers")
+    array = np.ascontiguousarray(given, np.float64)
     if not np.isfinite(array).all():
         raise ArgumentError(name, "a number that is not finite", "finite numbers")
     return array
@@ -195,9 +202,51 @@ def certify(run: Run) -> Certificate:
     IapbError
         The digest of the recomputed M differs from the recorded one.
     """
+    step = np.asarray(run.impacts.step)
+    if len(step) and not (step.min() >= 0 and step.max() < len(run.impulse)):
+        raise ArgumentError("impacts.step", step.max(), f"steps from 0 to {len(run.impulse) - 1}")
+    if (np.diff(step) < 0).any():
+        raise ArgumentError("impacts.step", step, "steps that never fall")
+    silent = run.law not in ENGINE_LAWS and not any(  # another world may not record impulses of contacts
+        piece.contacts.impulse.any() for piece in _pieces(run, step))
+    return _joined([_certify(piece, silent) for piece in _pieces(run, step)])
+
+
+def _pieces(run: Run, step: NDArray[np.int64]) -> Iterator[Any]:
+    """Yield what is certified of a run in pieces of limited memory; the arrays of the run may be in a file."""
+    steps, first = max(min(_STEPS, _PIECE // (24 * max(run.q.shape[1], 1))), 1), 0
+    while first == 0 or first < len(run.impulse):
+        offsets = np.asarray(run.contacts.offsets[first : first + steps + 1])
+        few = max(int(np.searchsorted(offsets, offsets[0] + _ROWS, side="right")) - 1, 1)  # contacts are bounded, too
+        offsets = offsets[: few + 1]
+        last, hits = first + max(len(offsets) - 1, 1), np.searchsorted(step, (first, first + len(offsets) - 1))
+        columns = {
+            "contacts": (slice(offsets[0], offsets[-1]), ("body_a", "body_b", "point", "normal", "impulse")),
+            "impacts": (slice(*hits), ("v_minus", "v_plus", "impulse", "rows", "rank", "scale", "mass_digest"))}
+        tables: dict[str, Any] = {
+            table: SimpleNamespace(**{name: np.asarray(getattr(getattr(run, table), name)[rows]) for name in names})
+            for table, (rows, names) in columns.items()}
+        tables["contacts"].offsets, tables["impacts"].step = offsets - offsets[0], step[slice(*hits)] - first
+        yield SimpleNamespace(law=run.law, law_settings=run.law_settings, scene_resolved=run.scene_resolved,
+                              q=run.q[first:last], impulse=run.impulse[first:last], before=int(hits[0]), **tables)
+        first = last
+
+
+def _joined(found: list[Certificate]) -> Certificate:
+    """Return one certificate of pieces of a run."""
+    gained = next((one for one in found if one.gains), found[0])
+    before = sum(one.impacts for one in found[: found.index(gained)])
+    most: dict[str, Any] = {name: float(np.fmax.reduce([getattr(one, name) for one in found]))
+            for name in ("largest_gain", "momentum", "span", "restitution", "total")}
+    counts = {name: sum(getattr(one, name) for one in found) for name in ("impacts", "gains", "by_integers", "checked")}
+    judged = [one.restitution_judged for one in found if one.impacts]
+    return replace(gained, **counts, **most, first_gain=gained.first_gain + before * bool(gained.gains),
+                   restitution_judged=bool(judged) and all(judged))
+
+
+def _certify(run: Any, silent: bool) -> Certificate:
+    """Judge one piece of a run in memory."""
     table, contacts, sums, size = run.impacts, run.contacts, -run.impulse, np.abs(run.impulse)
-    if len(table.step) and not (table.step.min() >= 0 and table.step.max() < len(run.impulse)):
-        raise ArgumentError("impacts.step", table.step.max(), f"steps from 0 to {len(run.impulse) - 1}")
     for name in ("v_minus", "v_plus", "impulse", "scale"):
         _finite(f"impacts.{name}", getattr(table, name))
     for name in ("impulse", "normal", "point"):
@@ -209,33 +258,30 @@ def certify(run: Run) -> Certificate:
     total = _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
     if not len(table.step):
         return _certificate([], total=total)
-    span, restitution = _contacts(run)
+    span, restitution = _contacts(run, silent)
     every_row = bool((table.rank >= table.rows).all())  # a row budget drops rows, and the record does not say why
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
     return _certificate(_batches(run), total=total, span=span, restitution=restitution, restitution_judged=judged)
 
 
-def _scene_of(run: Run) -> Scene:
-    return scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
-
-
-def _batches(run: Run) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
+def _batches(run: Any) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
     """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of `_BATCH`."""
-    table, mechanism = run.impacts, mechanism_of(_scene_of(run))
+    table, mechanism = run.impacts, mechanism_of(scene_from_values(run.scene_resolved))
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
         masses = mechanism.mass_matrices(run.q[table.step[chosen]])
         other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
         if len(other):
-            raise IapbError(f"impact {start + other[0]}: M computed again from q differs from the recorded M; "
-                            "the record was changed, or another version of iapb wrote it")
+            raise IapbError(f"impact {run.before + start + other[0]}: M computed again from q differs from the "
+                            "recorded M; the record was changed, or another version of iapb wrote it")
         yield masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]
 
 
 def exported_run(run: Run) -> Iterator[str]:
     """Yield the impacts of a run as the lines of `exported`."""
-    for mass_matrix, v_minus, v_plus, _ in _batches(run):
-        yield from exported(mass_matrix, v_minus, v_plus)
+    for piece in _pieces(run, np.asarray(run.impacts.step)):
+        for mass_matrix, v_minus, v_plus, _ in _batches(piece):
+            yield from exported(mass_matrix, v_minus, v_plus)
 
 
 def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Iterator[str]:
@@ -270,9 +316,29 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
     Raises
     ------
     ArgumentError
-        A shape does not fit, or a number is not finite.
+        A shape does not fit, a number is not finite or complex, or an M is indefinite.
     """
-    return _certificate([(mass_matrix, v_minus, v_plus, impulse)])
+    given = {"v_plus": v_plus} | ({} if impulse is None else {"impulse": impulse})
+    masses, *vectors = _impacts(mass_matrix, v_minus, **given)
+
+    def batches() -> Iterator[tuple[Floats, Floats, Floats, Floats | None]]:
+        for start in range(0, len(vectors[0]), _BATCH):
+            chosen = slice(start, start + _BATCH)
+            few = masses if len(masses) == 1 else masses[chosen]
+            _refuse_indefinite(few, start)
+            before, after, *recorded = (each[chosen] for each in vectors)
+            yield few, before, after, recorded[0] if recorded else None
+
+    return _certificate(batches())
+
+
+def _refuse_indefinite(masses: Floats, start: int) -> None:
+    scaled = masses / np.maximum(np.abs(masses).max(axis=(1, 2), keepdims=True, initial=0.0), 1e-300)
+    values = np.linalg.eigvalsh(0.5 * scaled + 0.5 * scaled.transpose(0, 2, 1))
+    wrong = np.flatnonzero(values.min(axis=1, initial=0.0) < -_INDEFINITE * np.abs(values).max(axis=1, initial=0.0))
+    if len(wrong):
+        raise ArgumentError(f"mass_matrix of impact {start + wrong[0]}", masses[wrong[0]].tolist(),
+                            "a matrix without negative eigenvalues")
 
 
 def _certificate(batches: Iterable[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike | None]], **known: Any
@@ -330,12 +396,11 @@ print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gaine
 """
 
 
-def _contacts(run: Run) -> tuple[float, float]:
+def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot decide."""
-    table, impacts, scene = run.contacts, run.impacts, _scene_of(run)
+    table, impacts, scene = run.contacts, run.impacts, scene_from_values(run.scene_resolved)
     mechanism, rubbing = mechanism_of(scene), run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
-    unrecorded = run.law not in ENGINE_LAWS and not table.impulse.any()  # another world may not record them
-    if rubbing or unrecorded or scene.contact.self_collision_rows == "per_body":
+    if rubbing or silent or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
     equality = len(values) == 1 and not run.law_settings.get("pushing")

@@ -174,11 +174,13 @@ def parse_robot(path: Path) -> ElementTree.Element:
         raise ArgumentError("path", str(path), f"a readable URDF file ({why})") from None
     if len(text) > MAX_BYTES:
         raise ArgumentError("URDF file", str(path), f"at most {MAX_BYTES} bytes")
-    parser = ElementTree.XMLParser(target=_Builder())
     try:
+        parser = ElementTree.XMLParser(target=_Builder())
         parser.feed(text)
         robot: ElementTree.Element = parser.close()
-    except ElementTree.ParseError as error:
+    except ArgumentError:
+        raise
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # also of an encoding that Python has, or not
         raise ArgumentError("URDF file", str(path), f"well-formed XML ({error})") from None
     if robot.tag != "robot":
         raise ArgumentError("URDF file", f"<{robot.tag}>", "a <robot> element at the top")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from os.path import isfile
+from os.path import exists, isfile
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -86,6 +87,8 @@ def load_scene(path: str | Path) -> Scene:
         the file is not a valid scene; the error lists all mistakes.
     """
     try:
+        if exists(path) and not isfile(path):
+            raise ValueError("no regular file")  # a pipe would be waited for
         with open(path, "rb") as file:
             content = file.read(4 * MAX_CHARACTERS + 1)
     except (OSError, ValueError) as failure:
@@ -121,4 +124,20 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
         scene._source_text, scene._file = text, file if file != "(text)" else ""
     else:
         scene._about = f"{scene.name} with its robots as bodies"
+    return scene
+
+
+def scene_from_values(given: Any) -> Scene:
+    """Return the scene with these plain values, all of them, as a run records them.
+
+    Raises
+    ------
+    ArgumentError
+        They are no scene; the error names the first mistake.
+    """
+    try:
+        scene: Scene = scene_kind(given).model_validate(given)
+    except ValidationError as failure:
+        wrong = failure.errors()[0]
+        raise ArgumentError("scene " + ".".join(map(str, wrong["loc"])), wrong["input"], wrong["msg"]) from None
     return scene

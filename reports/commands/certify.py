@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -15,10 +14,12 @@ import typer
 from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
 from iapb.advice.certificate import EXPORT_HEAD, exported, exported_run
-from iapb.errors import ArgumentError, RunFileError
-from reports.show import Answer, Json, counted
+from iapb.errors import ArgumentError, IapbError, RunFileError
+from reference.hdf5 import READ_BUDGET
+from reports.show import Answer, Json, counted, one_line, said
+from reports.store.care import is_run
 from reports.store.io import written_aside
-from reports.store.runs import read_run
+from reports.store.runs import opened_run
 
 _GIVEN = ("mass_matrix", "v_minus", "v_plus")
 
@@ -31,12 +32,23 @@ def certify(
     json_: Json = False,
 ) -> Answer:
     """Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent."""
-    paths = list(dict.fromkeys(path for given in files
-                               for path in (sorted(given.rglob("*.h5")) if given.is_dir() else [given])))
-    found = _exported(paths, export) if export else {path: _certificate(path) for path in paths}
+    paths = list(dict.fromkeys(path for given in files for path in (
+        sorted(filter(is_run, given.rglob("*.h5"))) if given.is_dir() else [given])))
+    found, unread = dict[Path, Certificate](), dict[Path, str]()
+    if export:
+        found = _exported(paths, export)
+    for path in [] if export else paths:
+        try:
+            found[path] = _certificate(path)
+        except (IapbError, OSError) as error:
+            if len(paths) == 1:
+                raise
+            unread[path] = f"not certified: {said(error, path)}"
     failed = [path for path, one in found.items() if not one.passed]
     judged = {path: asdict(one) | {"passed": one.passed, "words": one.words()} for path, one in found.items()}
-    return Answer({"passed": not failed, "files": judged}, list(_lines(found, failed)), 1 if failed else 0)
+    lines = [*(f"{one_line(path)}: {why}" for path, why in unread.items()), *_lines(found, failed)]
+    return Answer({"passed": not failed and not unread, "files": judged, "unread": unread}, lines,
+                  int(bool(failed or unread)))
 
 
 def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
@@ -53,7 +65,7 @@ def _exported(paths: list[Path], export: Path) -> dict[Path, Certificate]:
 def _lines(found: dict[Path, Certificate], failed: list[Path]) -> Iterator[str]:
     """Yield the certificate of each file: its residuals, how it was decided, and the first energy gain."""
     for path, one in found.items():
-        yield f"{path}: {one.words()}"
+        yield f"{one_line(path)}: {one.words()}"
         residuals = {"M(v⁺ − v⁻) − impulse": one.momentum, "impulse − Jᵀp": one.span,
                      "sum of impulses": one.total, "restitution": one.restitution}
         sizes = [f"{name} {x:.1e}" for name, x in residuals.items() if not np.isnan(x)]
@@ -74,20 +86,26 @@ def _certificate(path: Path, export: TextIO | None = None) -> Certificate:
     """Return the certificate of a run file or of an impact archive of any engine; write its impacts to `export`."""
     if path.suffix == ".npz":
         arrays = _archived(path)
-        certificate, lines = certify_impacts(**arrays), exported(*(arrays[name] for name in _GIVEN))
-    else:
-        run = read_run(path)
-        certificate, lines = certify_run(run), exported_run(run)
-    if export:
-        export.writelines(f"{line}\n" for line in lines)
+        certificate = certify_impacts(**arrays)
+        if export:
+            export.writelines(f"{line}\n" for line in exported(*(arrays[name] for name in _GIVEN)))
+        return certificate
+    with opened_run(path) as (run, _):
+        certificate = certify_run(run)
+        if export:
+            export.writelines(f"{line}\n" for line in exported_run(run))
     return certificate
 
 
 def _archived(path: Path) -> dict[str, np.ndarray]:
     try:
-        with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as archive:
+        if path.exists() and not path.is_file():
+            raise ValueError("no regular file")  # a pipe would be waited for
+        with zipfile.ZipFile(path) as members, np.load(path, allow_pickle=False) as archive:
+            if (size := sum(member.file_size for member in members.infolist())) > READ_BUDGET:
+                raise ValueError(f"it unpacks to {size} bytes: expected at most {READ_BUDGET}")
             arrays = {name: archive[name] for name in (*_GIVEN, "impulse") if name in archive.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except Exception as error:  # a damaged or foreign archive can raise any exception
         raise RunFileError(f"{path}: no archive of arrays: {error}") from None
     missing = [name for name in _GIVEN if name not in arrays]
     if missing:

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from iapb.run import Run
 from reports.commands.run import describe, run_as_json
 from reports.counterexamples import read_counterexample, recheck_command
 from reports.show import Answer, Json
-from reports.store.runs import read_provenance, read_stored
+from reports.store.runs import RunEntry, opened_run, read_provenance
 from verification.table import Table, titled
 
 # A listed impact: attribute of the run's table -> key in JSON and heading of the column
@@ -28,8 +29,13 @@ def inspect(
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
     if broken := read_counterexample(file):
         return Answer(broken, list(_broken_law(broken, file)))
-    run, entry = read_stored(file)
-    provenance, table = read_provenance(file), run.impacts
+    with opened_run(file) as (run, entry):
+        return _run(run, entry, read_provenance(file), impacts)
+
+
+def _run(run: Run, entry: RunEntry, provenance: dict[str, str], impacts: int) -> Answer:
+    """Describe a run whose arrays are in its file."""
+    table = run.impacts
     listed = [{"time": run.time[step]} | {name: getattr(table, name)[i] for name in _IMPACT}
               for i, step in enumerate(table.step[:impacts])]
     energy = {name: values[-1] for name, values in run.energy.items()} if run.steps else {}

@@ -11,11 +11,11 @@ from typing import Annotated
 
 import typer
 
-from iapb.errors import ArgumentError, IapbError
+from iapb.errors import ArgumentError
 from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
 from reports.resimulate import recover, repeat_run
-from reports.show import Answer, Json, stage_progress
+from reports.show import Answer, Json, one_line, said, stage_progress
 from reports.store.care import (
     DAMAGED,
     FOREIGN,
@@ -68,7 +68,7 @@ def store(
 
 
 def _listed(states: Sequence[FileState]) -> list[str]:
-    return [f"{state.path}: {state.state}: {state.why}" for state in states if state.state != WHOLE]
+    return [f"{one_line(state.path)}: {state.state}: {state.why}" for state in states if state.state != WHOLE]
 
 
 def _checked(where: Path, repair: bool) -> Answer:
@@ -80,11 +80,11 @@ def _checked(where: Path, repair: bool) -> Answer:
     lines = [*_listed(states), f"{len(states)} files: {parts or 'none'}"]
     if repair:
         logs = [line for parts in parts_of_killed(where) for line in _recovered(parts)]
-        aside = sum(not state.path.exists() for state in states)
+        aside = sum(state.state == DAMAGED and not state.path.exists() for state in states)
         lines += [*logs, f"{aside} damaged set aside, to be computed again when next asked for."]
         return Answer(facts | {"logs": logs, "aside": aside}, lines)
     if count[DAMAGED]:
-        lines.append(f"Set the damaged files aside, to be computed again, with: iapb store repair {where}")
+        lines.append(f"iapb store repair {where} sets aside damaged files whose seal holds; remove the others.")
     return Answer(facts, lines, int(bool(count[DAMAGED] or where.is_file() and count[FOREIGN])))
 
 
@@ -99,8 +99,8 @@ def _recovered(parts: Path) -> Iterator[str]:
             yield f"{parts}: damaged; what is before the damage is in the run, the parts are kept"
         else:
             remove_parts(parts)
-    except IapbError as error:
-        yield f"{parts}: left as they are: {str(error).removeprefix(f'{parts}: ')}"
+    except Exception as error:  # parts made by other software: any error is possible
+        yield f"{one_line(parts)}: left as they are: {said(error, parts)}"
 
 
 def _gc(where: Path, delete: bool) -> Answer:
@@ -123,12 +123,12 @@ def _again(where: Path) -> Answer:
             progress("runs simulated again", done, len(files))
             try:
                 found = repeat_run(path)
-            except IapbError as error:
-                facts[path] = {"failed": f"not simulated again: {str(error).removeprefix(f'{path}: ')}"}
-                lines.append(f"{path}: {facts[path]['failed']}")
+            except Exception as error:  # a run made by other software: any error is possible
+                facts[path] = {"failed": f"not simulated again: {said(error, path)}"}
+                lines.append(f"{one_line(path)}: {facts[path]['failed']}")
                 continue
             facts[path] = {"same": found.same, "differs": found.differs}
-            lines.append(f"{path}: {'the same to the last bit' if found.same else 'differs in'}")
+            lines.append(f"{one_line(path)}: {'the same to the last bit' if found.same else 'differs in'}")
             lines += [f"  {one.name}: {one.how}" for one in found.differs]
             made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
             if not found.same and made != here:

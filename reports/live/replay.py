@@ -16,7 +16,7 @@ from iapb.simulation import Simulation
 from reports.live.deadline import TICK, Pace, Tally, Timetable
 from reports.provenance import collect_provenance
 from reports.resimulate import coupling_of, law_of, scene_of, simulation_of
-from reports.store.io import mark_store, new_file
+from reports.store.io import mark_store, new_file, refuse_foreign
 from reports.store.parts import Parts, parts_of, read_head
 from reports.store.runs import read_run, store_run
 from reports.store.tables import append_columns, read_columns, write_head
@@ -61,6 +61,8 @@ def finish_live(folder: Path, stopped: str, ticks: int = 0) -> tuple[Path, Path,
     recorder = Recorder(simulation_of(head))
     recorder.start = {name: np.array(values, np.float64) for name, values in told["start"].items()}
     path = folder.with_suffix("")
+    for target in (path, _timetable_of(path)):
+        refuse_foreign(target)
 
     def pieces(group: Any) -> Iterator[Run]:
         for piece in joined(folder, recorder, str(head["world"]), ticks, rows):

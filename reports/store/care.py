@@ -1,8 +1,8 @@
 """Maintenance of stores: find files that are incomplete, damaged or no longer needed.
 
-Only files in a marked store (`reports.store.io.mark_store`) are ever renamed or removed, and only files of iapb: a file
-without iapb's seal whose header does not name iapb's formats is never touched. A damaged file is renamed, so that it is
-computed again. All results that `gc` removes can be computed again from their inputs.
+Only files in a marked store (`reports.store.io.mark_store`) are ever renamed or removed, and only files of iapb, with
+our format attribute and a seal that holds. Such a file that contradicts itself is renamed, so that it is computed
+again; one whose seal is broken is named, and stays. What `gc` removes can be computed again from its inputs.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from iapb.errors import ArgumentError, RunFileError
 from reports.store import io
 from reports.store.folder import PARTIAL_SUFFIX
-from reports.store.io import WRITING, is_ours, opened
+from reports.store.io import WRITING, is_ours, looks_ours, opened
 from reports.store.keys import SOURCES, evidence_version, is_older_engine
 from reports.store.parts import at_work, is_parts, read_head, remove_parts
 from reports.store.runs import opened_run, read_provenance
@@ -53,7 +53,10 @@ def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[F
     for path in paths:
         if progress is not None:
             progress(len(states), len(paths))
-        states.append(_state(path))
+        try:
+            states.append(_state(path))
+        except OSError as error:  # removed meanwhile, or not for us to read
+            states.append(FileState(path, FOREIGN, f"cannot be read: {error.strerror or error}"))
     return tuple(states)
 
 
@@ -71,7 +74,7 @@ def _state(path: Path) -> FileState:
     if is_parts(path):
         why = "a process is at work on it" if at_work(path) else "iapb run --resume goes on, repair makes it readable"
         return FileState(path, LEFTOVER, f"a run in the making: {why}")
-    if path.name.endswith(WRITING) or not is_ours(path):
+    if path.name.endswith(WRITING) or not looks_ours(path):
         return FileState(path, FOREIGN, "no file of iapb: no seal, and nothing that says so")
     if path.name.endswith(DAMAGED_SUFFIX):
         return FileState(path, LEFTOVER, "set aside as damaged")
@@ -93,7 +96,7 @@ def is_run(path: Path) -> bool:
     try:
         return _kind_and_code(path)[0] == FORMAT
     except RunFileError:
-        return is_ours(path)
+        return looks_ours(path)
 
 
 def _kind_and_code(path: Path) -> tuple[str, str]:
@@ -122,16 +125,23 @@ def parts_of_killed(folder: Path | str) -> list[Path]:
 
 
 def repair_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Rename damaged files in all stores; return the earlier state of every file.
+    """Rename the damaged files in all stores whose seal holds; return the earlier state of every file.
 
-    A renamed file is computed again when it is next requested.
+    A renamed file is computed again when it is next requested. One with a broken seal may be somebody's, and stays.
     """
-    stores = stores_below(folder)
-    states = check_store(folder, progress)
-    for state in states:
-        if state.state == DAMAGED and state.path.parent in stores and not state.path.is_symlink():
-            os.replace(state.path, state.path.with_name(state.path.name + DAMAGED_SUFFIX))
-    return states
+    stores, states = stores_below(folder), check_store(folder, progress)
+    return tuple(replace(state, why=f"{state.why} (left where it is)")
+                 if state.state == DAMAGED and not (state.path.parent in stores and _set_aside(state.path)) else state
+                 for state in states)
+
+
+def _set_aside(path: Path) -> bool:
+    aside = path.with_name(path.name + DAMAGED_SUFFIX)
+    with suppress(OSError):  # in a folder that cannot be changed
+        if is_ours(path) and not os.path.lexists(aside):
+            os.rename(path, aside)
+            return True
+    return False
 
 
 def garbage(folder: Path | str) -> tuple[FileState, ...]:
@@ -157,7 +167,7 @@ def _garbage(store: Path) -> Iterator[FileState]:
         elif name.endswith(WRITING) or not is_ours(path):
             continue
         elif name.endswith(DAMAGED_SUFFIX):
-            yield _state(path)
+            yield FileState(path, LEFTOVER, "set aside as damaged")
         elif name.endswith(PARTIAL_SUFFIX):
             if io.is_old(path) and _is_whole(path.with_suffix("")):
                 yield FileState(path, PARTIAL, "the finished run is there")

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store.io import abandoned, mark_store, remove_unless_locked
+from reports.store.io import abandoned, mark_store, refuse_foreign, remove_unless_locked
 from reports.store.keys import code_label, run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
@@ -103,9 +103,10 @@ class RunStore:
     def _keep(self, place: Place, run: Run) -> RunEntry:
         mark_store(self.folder)
         if not run.complete:
+            refuse_foreign(place.partial)
             return store_run(place.partial, run, key=place.key, replace=True)
         entry = store_run(place.path, run, key=place.key, code=code_label(self.code))
-        place.partial.unlink(missing_ok=True)
+        remove_unless_locked(place.partial)
         return entry
 
     def entries(self) -> tuple[RunEntry, ...]:

@@ -13,17 +13,19 @@ import hashlib
 import json
 import os
 import re
+import signal
 import stat
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import Any
 
 import numpy as np
 
-from iapb.errors import RunFileError
-from reference.hdf5 import leads_out
+from iapb.errors import IapbError, RunFileError
+from reference.hdf5 import Budget, check_items, check_size, read_dataset
 from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
 
 MARK_NAME = "iapb-store.json"
@@ -39,16 +41,12 @@ _ABANDONED_AFTER_SECONDS = 3600.0
 _MARK = b"\niapb sha256 "
 SEAL = len(_MARK) + 64 + 1  # bytes: the mark, 64 hexadecimal digits, a newline
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_FORMATS = (FORMAT.encode(), TABLE_FORMAT.encode())
-_KEYED = re.compile(r".+-[0-9a-f]{16}\.h5(\.\w+)?")  # a run key, and what says that a file is no complete run
-_MARK_HEAD = b'{"format": "iapb store"'
+_FORMATS = (FORMAT, TABLE_FORMAT)
 PART_HEAD = b'{"format": "iapb part"'  # see `reports.store.parts`
 _HEAD = 1 << 16  # bytes, among which the attributes of a file are
 _BLOCK = 1 << 20
 # Chunks of about this size: small enough to look at a part, large enough to compress.
 _CHUNK_BYTES = 1 << 17
-_MOST_PACKED = 1100  # largest expansion factor: deflate makes at most 1032 bytes of one
-_UNPACKED_SMALL = 1 << 20  # bytes that any dataset may state
 
 
 def _sync(path: Path) -> None:
@@ -68,8 +66,7 @@ def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterat
     the temporary file is removed: the first of two writers wins. A file that is not `synced` may be lost, not damaged
     unseen, by a power failure.
     """
-    aside = target.with_name(f".{target.name}.{os.getpid()}{WRITING}")
-    lock = _locked(aside)
+    aside, lock = _locked(target)
     try:
         yield aside
         if synced:
@@ -91,15 +88,18 @@ def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterat
         os.close(lock)
 
 
-def _locked(path: Path) -> int:
-    """Open a file and lock it until it is closed or the process ends; wait if `_held` holds the lock briefly."""
+def _locked(target: Path) -> tuple[Path, int]:
+    """Return a new temporary file for a target, locked until it is closed or the process ends; no file is reused."""
+    number = os.getpid()
     while True:
-        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        path = target.with_name(f".{target.name}.{number}{WRITING}")
+        try:
+            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
+        except FileExistsError:
+            number += 1 << 22  # beyond the numbers of processes
+            continue
         fcntl.flock(file, fcntl.LOCK_EX)
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(file), path.stat()):
-                return file
-        os.close(file)  # another process removed it as the file of a killed writer
+        return path, file
 
 
 @contextmanager
@@ -121,10 +121,18 @@ def is_locked(path: Path) -> bool:
 
 
 def remove_unless_locked(path: Path) -> None:
-    """Remove a file if no process is writing it."""
-    with _held(path) as free, suppress(OSError):
-        if free:
-            path.unlink()
+    """Remove a file if it is ours, now, and no process is writing it."""
+    with suppress(OSError):
+        if is_ours(path):
+            with _held(path) as free:
+                if free:
+                    path.unlink()
+
+
+def refuse_foreign(path: Path) -> None:
+    """Raise RunFileError if there is a file at `path` that is not ours, and so may not be replaced."""
+    if os.path.lexists(path) and not is_ours(path):
+        raise RunFileError(f"{path}: is no whole file of iapb, and is not replaced: move it away")
 
 
 def mark_store(folder: Path) -> None:
@@ -138,9 +146,10 @@ def mark_store(folder: Path) -> None:
 def is_store(folder: Path) -> bool:
     """Return whether a folder is marked as a store with a format that this version supports."""
     try:
-        mark = json.loads((folder / MARK_NAME).read_text(encoding="utf-8"))
+        file = folder / MARK_NAME
+        mark = json.loads(file.read_text(encoding="utf-8") if file.is_file() else "")  # a pipe would be waited for
         return bool(mark["format"] == _STORE["format"] and mark["format_version"] <= _STORE["format_version"])
-    except (OSError, ValueError, TypeError, KeyError):
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return False
 
 
@@ -152,9 +161,9 @@ def is_old(path: Path) -> bool:
 
 
 def abandoned(folder: Path) -> list[Path]:
-    """Return the temporary files that killed writers left in a store, by name and content; not those still written."""
+    """Return the whole temporary files that killed writers left in a store; not those still written."""
     found = sorted(folder.glob(f".*{WRITING}")) if is_store(folder) else []
-    return [path for path in found if is_aside(path) and is_ours(path) and is_old(path) and not is_locked(path)]
+    return [path for path in found if is_aside(path) and is_old(path) and not is_locked(path) and is_ours(path)]
 
 
 def is_aside(path: Path) -> bool:
@@ -163,26 +172,32 @@ def is_aside(path: Path) -> bool:
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether a file is of iapb, complete or damaged, by what nobody else's file has; links and pipes are not.
+    """Return whether a file has our format attribute, or the head of a part, and a seal that holds.
 
-    It ends with a seal or begins like a part. Where damage took the seal of a run or table, its HDF5 head has our
-    attributes and its name a run key. A temporary file may also be empty or begin like the mark of a store.
+    Only such files are ever renamed or removed. Links, pipes and files with two names are not ours.
     """
-    found = path.lstat()
-    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+    with suppress(OSError, RunFileError):
+        if _is_plain(path) and _ends(path)[0].startswith(PART_HEAD):
+            return _seal_holds(path)
+        with opened(path, expected_format=None) as file:
+            return _is_plain(path) and file.attrs.get("format") in _FORMATS
+    return False
+
+
+def looks_ours(path: Path) -> bool:
+    """Return whether a file is ours or was so before it was damaged: it ends like a seal, begins like a part, or its
+    HDF5 head has our attributes."""
+    if not _is_plain(path):
         return False
-    (head, end), aside = _ends(path), is_aside(path)
-    if end.startswith(_MARK) or head.startswith(PART_HEAD):
-        return True
-    if aside and (not head or (MARK_NAME in path.name and head.startswith(_MARK_HEAD))):
-        return True
-    return (aside or _KEYED.fullmatch(path.name) is not None) and _says_so(head)
+    head, end = _ends(path)
+    return end.startswith(_MARK) or head.startswith(PART_HEAD) or (
+        head.startswith(_HDF5_SIGNATURE) and b"\0format_version\0" in head
+        and any(name.encode() in head for name in _FORMATS))
 
 
-def _says_so(head: bytes) -> bool:
-    """Return whether the head of an HDF5 file has our attributes `format` and `format_version` and one of our names."""
-    named = any(re.search(rb"(?<![ -~])" + name + rb"(?![ -~])", head) for name in _FORMATS)
-    return head.startswith(_HDF5_SIGNATURE) and b"\0format\0" in head and b"\0format_version\0" in head and named
+def _is_plain(path: Path) -> bool:
+    found = path.lstat()
+    return stat.S_ISREG(found.st_mode) and found.st_nlink == 1
 
 
 def _ends(path: Path) -> tuple[bytes, bytes]:
@@ -206,9 +221,14 @@ def _check_seal(path: Path) -> None:
     size = path.stat().st_size - SEAL
     if size < 0 or not mark.startswith(_MARK):
         raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb; "
-                           "iapb store repair sets damaged runs aside")
-    if mark != _MARK + _checksum(path, size).encode() + b"\n":
-        raise RunFileError(f"{path}: differs from its checksum, the file is damaged")
+                           "if it was a run, remove it to compute it again")
+    if not _seal_holds(path):
+        raise RunFileError(f"{path}: differs from its checksum, the file is damaged; remove it to compute it again")
+
+
+def _seal_holds(path: Path) -> bool:
+    size = max(path.stat().st_size - SEAL, 0)
+    return _ends(path)[1] == _MARK + _checksum(path, size).encode() + b"\n"
 
 
 def _checksum(path: Path, size: int) -> str:
@@ -219,6 +239,29 @@ def _checksum(path: Path, size: int) -> str:
             digest.update(block)
             size -= len(block)
     return digest.hexdigest()
+
+
+_noted: list[int] = []  # Ctrl-C that came while a file is written
+
+
+@contextmanager
+def _noting_ctrl_c() -> Iterator[None]:
+    """Note Ctrl-C and raise it at the end, or in `extend`: in a callback of h5py Python would drop the exception."""
+    if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda number, frame: _noted.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        _raise_noted()
+
+
+def _raise_noted() -> None:
+    if _noted:
+        _noted.clear()
+        raise KeyboardInterrupt
 
 
 @contextmanager
@@ -233,6 +276,11 @@ def new_file(path: Path, *, replace: bool, large: bool = False) -> Iterator[Any]
     RunFileError
         The file cannot be written; then nothing at `path` was changed.
     """
+    with _noting_ctrl_c():
+        yield from _new_file(path, replace, large)
+
+
+def _new_file(path: Path, replace: bool, large: bool) -> Iterator[Any]:
     import h5py
 
     if not large:
@@ -272,11 +320,10 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
     if not path.is_file():
         what = "a folder, not a file" if path.is_dir() else "no regular file" if path.exists() else "no such file"
         raise RunFileError(f"{path}: {what}")
-    _check_seal(path)
     try:
-        with h5py.File(path, "r") as file:
-            if outside := leads_out(file):
-                raise RunFileError(f"{path}: {outside}: expected a file without links to other files")
+        _check_seal(path)
+        with h5py.File(path, "r", rdcc_nbytes=2 * _CHUNK_BYTES) as file:
+            check_items(file)
             found = file.attrs.get("format")
             if expected_format not in (None, found):
                 raise RunFileError(f"{path}: format is {found!r}: expected {expected_format!r}")
@@ -287,7 +334,7 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
                 raise RunFileError(f"{path}: format version is {version}, of {'an earlier' if earlier else 'a later'} "
                                    f"iapb: this one reads {FORMAT_VERSION}{more}")
             yield file
-    except RunFileError:
+    except IapbError:
         raise
     except Exception as error:  # sealed, but made by other software: any error is possible
         raise RunFileError(f"{path}: cannot be read as {expected_format or 'a file of iapb'}: {error}") from error
@@ -324,6 +371,7 @@ def write_values(group: Any, name: str, values: Any, *, growing: bool = False) -
 
 def extend(dataset: Any, values: Any) -> None:
     """Append rows to a growing dataset."""
+    _raise_noted()
     if len(values):
         first = len(dataset)
         dataset.resize(first + len(values), axis=0)
@@ -357,33 +405,28 @@ def group_of(file: Any, name: str, path: Path | str) -> Any:
     return file[name]
 
 
-def read_values(group: Any, name: str, path: str) -> Any:
-    """Return a dataset of `group` as an array, or as a tuple of texts.
+def read_values(group: Any, name: str, budget: Budget) -> Any:
+    """Return a dataset of `group` as an array, a text or a tuple of texts.
 
     Raises
     ------
     RunFileError
-        There is no such dataset, or it states more values than its bytes can hold.
+        There is no such dataset.
+    ValueError
+        It states more values than its bytes can hold, or fills more than the budget.
     """
-    import h5py
-
-    dataset = dataset_of(group, name, path)
-    if h5py.check_string_dtype(dataset.dtype) is None:
-        return dataset[()]
-    texts = dataset.asstr()[()]
-    return str(texts) if dataset.shape == () else tuple(str(text) for text in texts)
+    return read_dataset(dataset_of(group, name, budget), budget)
 
 
-def dataset_of(group: Any, name: str, path: str) -> Any:
+def dataset_of(group: Any, name: str, budget: Budget) -> Any:
     """Return a dataset of `group` without reading its values; it raises the errors of `read_values`."""
     import h5py
 
     within = isinstance(group, h5py.Group)  # "get" would read a whole dataset, of any stated length
     dataset = group.get(name) if within else None
     if not isinstance(dataset, h5py.Dataset):
-        raise RunFileError(f"{path}: {group.name}/{name} is missing")
-    if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * dataset.id.get_storage_size():
-        raise RunFileError(f"{path}: {group.name}/{name} states {dataset.size} values, more than its bytes can hold")
+        raise RunFileError(f"{budget}: {group.name}/{name} is missing")
+    check_size(dataset, budget)
     return dataset
 
 

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from math import prod
 from pathlib import Path
+from stat import S_ISREG
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import RunFileError
 from iapb.recording import LINES
-from reports.store.io import PART_HEAD, SEAL, is_aside, is_locked, is_ours, sealed, written_aside
+from reports.store.io import PART_HEAD, SEAL, is_aside, is_locked, is_ours, looks_ours, sealed, written_aside
 
 PARTS_SUFFIX = ".parts"
 _LOCK = "lock"
@@ -57,6 +58,7 @@ class Parts:
     ----------
     folder : created if it does not exist.
     head : inputs of the run, for a new one; None: go on with the parts that are there.
+    at_work : False only to remove them.
     synced : whether each part is on the disk, not only handed to the system, when it is written.
 
     Raises
@@ -65,8 +67,9 @@ class Parts:
         Another process is writing it.
     """
 
-    def __init__(self, folder: Path, head: Mapping[str, Any] | None = None, *, synced: bool = True) -> None:
-        self.folder, self.steps, self._synced = folder, 0, synced
+    def __init__(self, folder: Path, head: Mapping[str, Any] | None = None, *, synced: bool = True,
+                 at_work: bool = True) -> None:
+        self.folder, self.steps, self._synced, self._at_work = folder, 0, synced, at_work
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -81,10 +84,11 @@ class Parts:
         self._run = _run_of(folder)
 
     def go_on(self, parts: int, steps: int) -> None:
-        """Keep the first `parts` parts, which have so many steps, and remove the others."""
+        """Keep the first `parts` parts, which have so many steps, and remove the others; of a run at work damaged ones,
+        too."""
         for path in sorted(self.folder.iterdir(), reverse=True):
             if is_aside(path) or (_NAME.fullmatch(path.name) and int(path.stem) >= parts):
-                if is_ours(path) or (path.is_file() and not path.stat().st_size):
+                if is_ours(path) or (self._at_work and (looks_ours(path) or not path.lstat().st_size)):
                     path.unlink()
         self._count, self.steps = parts, steps
 
@@ -121,7 +125,8 @@ class Parts:
         if remove:
             self.go_on(0, 0)
             with suppress(OSError):
-                if not os.fstat(self._lock).st_size:  # else of somebody else
+                found = os.fstat(self._lock)
+                if S_ISREG(found.st_mode) and found.st_nlink == 1 and not found.st_size:  # else of somebody else
                     (self.folder / _LOCK).unlink()
                 self.folder.rmdir()
         os.close(self._lock)
@@ -135,7 +140,7 @@ def parts_of(path: Path) -> Path:
 def is_parts(folder: Path) -> bool:
     """Return whether a path is the folder of parts of a run of iapb, and no link to one."""
     head = _path(folder, 0)
-    return folder.name.endswith(PARTS_SUFFIX) and not folder.is_symlink() and head.is_file() and is_ours(head)
+    return folder.name.endswith(PARTS_SUFFIX) and not folder.is_symlink() and head.is_file() and looks_ours(head)
 
 
 def at_work(folder: Path) -> bool:
@@ -146,7 +151,8 @@ def at_work(folder: Path) -> bool:
 def remove_parts(folder: Path) -> None:
     """Remove the parts of a run, unless a process is writing them."""
     with suppress(PartsLocked):
-        Parts(folder).close(remove=True)
+        if is_ours(_path(folder, 0)):
+            Parts(folder, at_work=False).close(remove=True)
 
 
 def read_head(folder: Path) -> Mapping[str, Any]:
@@ -198,10 +204,17 @@ def _read(folder: Path, number: int) -> tuple[dict[str, Any], dict[str, NDArray[
     if not content.startswith(PART_HEAD) or sealed(content) != whole:
         return None
     line = content.partition(b"\n")[0]
-    facts, arrays, start = json.loads(line), {}, len(line) + 1
-    if (facts["format_version"], facts["number"]) != (_FORMAT["format_version"], number):
+    try:  # sealed, but perhaps made by other software
+        facts, arrays, start = json.loads(line), {}, len(line) + 1
+        if (facts["format_version"], facts["number"]) != (_FORMAT["format_version"], number):
+            return None
+        for name, kind, shape in facts["arrays"]:
+            arrays[name] = np.frombuffer(content, kind, prod(shape), start).reshape(shape)
+            start += arrays[name].nbytes
+        for (table, listed), rows in zip(LINES.items(), facts["used"] if number else (), strict=bool(number)):
+            if any(len(arrays[f"{table}/{each.name}"]) != rows for each in listed):
+                return None
+        _ = facts["run"], arrays[_MORE] if number else None, facts["first"] + facts["seconds"] if number else 0
+    except (ValueError, TypeError, LookupError, RecursionError, OverflowError):
         return None
-    for name, kind, shape in facts["arrays"]:
-        arrays[name] = np.frombuffer(content, kind, prod(shape), start).reshape(shape)
-        start += arrays[name].nbytes
     return facts, arrays

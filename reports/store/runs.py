@@ -14,8 +14,10 @@ import numpy as np
 from iapb.errors import RunFileError
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, coordinates_of, energy_dimension, unit_of
 from iapb.schema import Quantity
+from reference.hdf5 import Budget
 from reports.provenance import collect_provenance
 from reports.store.io import (
+    blocks,
     dataset_of,
     extend,
     group_of,
@@ -37,7 +39,7 @@ from reports.store.schema import (
     TEXTS,
 )
 
-Reader = Callable[[Any, str, str], Any]  # (group, name, path): `read_values` or `dataset_of`
+Reader = Callable[[Any, str, Budget], Any]  # (group, name, budget): `read_values` or `dataset_of`
 TIME = Quantity("time", ("time",), np.float64, "s", "")
 
 
@@ -160,31 +162,36 @@ def _append(file: Any, part: Run) -> None:
             extend(scale, part.time[1:] if along == "time" else np.arange(len(scale), len(dataset)))
 
 
-def read_run(path: Path | str) -> Run:
+def read_run(path: Path | str, budget: int | None = None) -> Run:
     """Return the run in a file, partial or complete; a changed file is never accepted as a run.
+
+    budget : bytes that its values may fill, by default `reference.hdf5.READ_BUDGET` or 64 times the file's size.
 
     Raises
     ------
     RunFileError
         The file is absent, damaged or not a run.
     """
-    return read_stored(path)[0]
+    return read_stored(path, budget)[0]
 
 
-def read_stored(path: Path | str) -> tuple[Run, RunEntry]:
+def read_stored(path: Path | str, budget: int | None = None) -> tuple[Run, RunEntry]:
     """Return the run in a file and the entry of the file; it raises the errors of `read_run`."""
-    with opened_run(path, read_values) as found:
+    with opened_run(path, read_values, budget) as found:
         return found
 
 
 @contextmanager
-def opened_run(path: Path | str, read: Reader = dataset_of) -> Iterator[tuple[Run, RunEntry]]:
+def opened_run(
+    path: Path | str, read: Reader = dataset_of, budget: int | None = None,
+) -> Iterator[tuple[Run, RunEntry]]:
     """Yield a run whose arrays stay in its file, to be read in `blocks`, and the entry of the file.
 
     The file is checked completely, in constant memory.
     """
     with opened(path) as file:
-        run, entry = _run_in(file, path, read), _entry(file, path)
+        run, entry = _run_in(file, path, read, budget), _entry(file, path)
+        _check(run)
         if content_hash(run) != entry.content_hash:
             raise RunFileError(f"{path}: the results differ from their content hash, the file is damaged")
         yield run, entry
@@ -200,7 +207,8 @@ def read_provenance(path: Path | str) -> dict[str, str]:
     """
     with opened(path, expected_format=None) as file:
         group = group_of(file, "provenance", path)
-        found = {name: read_values(group, name, str(path)) for name in group}
+        budget = Budget(path, file)
+        found = {name: read_values(group, name, budget) for name in group}
     for name, text in found.items():
         if not isinstance(text, str):
             raise RunFileError(f"{path}: provenance/{name} is no text")
@@ -227,9 +235,33 @@ def _entry(file: Any, path: Path | str) -> RunEntry:
     return RunEntry(Path(path).name, *(str(file.attrs[name]) for name in names))
 
 
-def _run_in(file: Any, path: Path | str, read: Reader) -> Run:
+def _check(run: Run) -> None:
+    """Raise ValueError if two lengths contradict each other, if tables point out of a run, or a name has two lines."""
+    lengths = {"time": run.steps + 1, "step_edge": run.steps + 1, "step": run.steps, "body": len(run.body_names),
+               "coordinate": len(run.coordinate_names), "velocity": len(run.velocity_names)}  # fmt: skip
+    for group, quantity, values in _columns(run):
+        for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
+            if lengths.setdefault(dimension, length) != length:
+                raise ValueError(f"{group}/{quantity.name} has {length} along {dimension}, not {lengths[dimension]}")
+    for name, values, most in (("contacts/offsets", run.contacts.offsets, lengths["contact"]),
+                               ("impacts/step", run.impacts.step, run.steps - 1)):
+        last = 0
+        for block in blocks(values):
+            line = np.concatenate(([last], block, [most]))
+            if (wrong := np.flatnonzero(np.diff(line) < 0)).size:
+                raise ValueError(f"{name} holds {line[wrong[0] + 1]} after {line[wrong[0]]}: expected numbers that "
+                                 f"never fall, up to {most}")
+            last = line[-2]
+    texts = [getattr(run, attribute) for _, name, attribute in TEXTS if name in ("name", "world", "kernel")]
+    texts += [run.stopped, *run.coordinate_names, *run.velocity_names, *run.body_names, *run.remarks, *run.distrust]
+    for text in (*texts, *(part for row in run.effects for part in (row.name, row.reason, row.ignores))):
+        if len(str(text).splitlines()) > 1:
+            raise ValueError(f"the name {text!r} has more than one line")
+
+
+def _run_in(file: Any, path: Path | str, read: Reader, budget: int | None = None) -> Run:
     """Return the run in an open file; `read` is `read_values` (arrays in memory) or `dataset_of` (on disk)."""
-    place = str(path)
+    place = Budget(path, file, budget)
     texts = {attribute: read_values(file[group], name, place) for group, name, attribute in TEXTS}
     tables = {group: {quantity.name: _numbers(read, file[group], quantity, place) for quantity in listed}
               for group, (listed, _) in GROUPS.items()}  # fmt: skip
@@ -256,8 +288,8 @@ def _run_in(file: Any, path: Path | str, read: Reader) -> Run:
     )  # fmt: skip
 
 
-def _numbers(read: Reader, group: Any, quantity: Quantity, path: str) -> Any:
-    values = read(group, quantity.name, path)
+def _numbers(read: Reader, group: Any, quantity: Quantity, budget: Budget) -> Any:
+    values = read(group, quantity.name, budget)
     if not (hasattr(values, "dtype") and values.dtype.kind in "biuf" and values.ndim):
-        raise RunFileError(f"{path}: {group.name}/{quantity.name} is no list of numbers")
+        raise RunFileError(f"{budget}: {group.name}/{quantity.name} is no list of numbers")
     return values.astype(np.bool_) if quantity.dtype is np.bool_ else values

@@ -17,6 +17,7 @@ import numpy as np
 
 from iapb.errors import RunFileError
 from iapb.names import one_of
+from reference.hdf5 import Budget
 from reports.provenance import collect_provenance
 from reports.store.io import (
     extend,
@@ -88,8 +89,8 @@ def read_columns(path: Path | str, name: str | None = None) -> dict[str, tuple[s
         tables = [each for each in file if each != "provenance"]
         if not tables or name not in (None, *tables):
             raise RunFileError(f"{path}: no table {name!r}: expected {one_of(str(name), tables)}")
-        group = group_of(file, name or tables[0], path)
-        return {key: (str(group[key].attrs["units"]), read_values(group, key, str(path))) for key in group}
+        group, budget = group_of(file, name or tables[0], path), Budget(path, file)
+        return {key: (str(group[key].attrs["units"]), read_values(group, key, budget)) for key in group}
 
 
 def read_table(path: Path | str, name: str | None = None) -> Table:
@@ -118,5 +119,5 @@ def write_record(
 def read_record(path: Path) -> Any:
     """Return the records in a file as lists and mappings; it raises the errors of `read_columns`."""
     with opened(path, TABLE_FORMAT) as file:
-        text = read_values(group_of(file, RECORDS, path), "json", str(path))
+        text = read_values(group_of(file, RECORDS, path), "json", Budget(path, file))
         return json.loads(text if isinstance(text, str) else text[0])  # files of earlier versions have a list of one

@@ -25,7 +25,7 @@ import numpy as np
 from reports import streaming
 from reports.cli import main
 from reports.store.care import DAMAGED, WHOLE, check_store, is_run
-from reports.store.io import mark_store
+from reports.store.io import mark_store, sealed
 from reports.store.runs import read_entry, read_run, store_run
 
 OWN = "own"  # folder of a command's results, in the foreign tree
@@ -156,7 +156,7 @@ def _plant(folder: Path, garbage: bytes) -> None:
         (folder / OWN / f"{_STALE}{number}.h5").write_bytes(garbage)
     for number in range(_LEFT if garbage else 0):
         left = folder / OWN / f".{_STALE}{number}.h5.1.writing"
-        left.write_bytes(b"")
+        left.write_bytes(sealed(b'{"format": "iapb part"'))  # whole: what is half written stays
         os.utime(left, (0.0, 0.0))
 
 

@@ -11,7 +11,7 @@ import pytest
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from reports.store import RunStore, content_hash, read_run
-from reports.store.io import mark_store
+from reports.store.io import mark_store, sealed
 
 MakeRun = Callable[..., Run]
 INPUTS = {"scene": {"name": "peg", "rate": 512}, "law": "IAPB"}
@@ -48,7 +48,7 @@ def test_an_interrupted_run_is_kept_as_partial_and_finished_later(tmp_path: Path
 def test_what_a_killed_writer_left_aside_is_removed_once_it_is_old(tmp_path: Path) -> None:
     old, young, theirs = (tmp_path / name for name in (".a.h5.1.writing", ".b.h5.2.writing", ".c.odt.1.writing"))
     for path in (old, young, theirs):
-        path.write_text("")
+        path.write_bytes(sealed(b'{"format": "iapb part"'))
         os.utime(path, None if path == young else (0, 0))
     RunStore(tmp_path)
     assert old.exists()  # nobody has said that this is a store
