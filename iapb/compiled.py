@@ -40,6 +40,7 @@ from numba.extending import (
     unbox,
 )
 
+from iapb.compiling import compiling_told, to_stderr
 from iapb.inlining import compile_as_whole
 
 # Files without kernels that decide what is compiled: how, and constants that kernels read.
@@ -109,7 +110,8 @@ class Entry:
     def __call__(self, *arguments: Any) -> Any:
         """Call the kernel."""
         if self._compiled is None:
-            self._compiled = self.taking(*arguments)
+            with compiling_told(to_stderr):
+                self._compiled = self.taking(*arguments)
         return self._compiled(*arguments)
 
     def taking(self, *examples: Any) -> Callable[..., Any]:

@@ -103,12 +103,18 @@ class MissingDependencyError(IapbError, ImportError):
         super().__init__(f"{purpose} needs {package}, which is not installed. Install it with: {install}")
 
 
-#: The extra of ``pip install 'iapb[...]'`` that installs a package which the engine itself does not need.
+def installing(extra: str) -> str:
+    """Return the command that installs an extra; no package index has iapb."""
+    return f"pip install '.[{extra}]' (in a checkout of iapb)"
+
+
+#: The extra that installs a package which the engine itself does not need.
 EXTRAS = {
     **dict.fromkeys(("scipy", "h5py", "threadpoolctl", "pinocchio", "cvxpy", "clarabel", "qpsolvers", "daqp",
                      "quadprog", "proxsuite", "quantecon"), "reference"),
-    **dict.fromkeys(("hypothesis", "sympy", "flint"), "verify"),
-    **dict.fromkeys(("typer", "rich", "matplotlib", "jinja2", "latex2mathml", "viser"), "report"),
+    **dict.fromkeys(("hypothesis", "sympy", "flint", "typer", "rich"), "verify"),
+    **dict.fromkeys(("matplotlib", "jinja2", "latex2mathml", "viser"), "report"),
+    **dict.fromkeys(("xarray", "h5netcdf"), "all"),
 }  # fmt: skip
 
 
@@ -117,7 +123,7 @@ def name_the_extra(error: ModuleNotFoundError, purpose: str) -> ImportError:
     package = (error.name or "").partition(".")[0]
     if package not in EXTRAS:
         return error
-    return MissingDependencyError(package, purpose, f"pip install 'iapb[{EXTRAS[package]}]'")
+    return MissingDependencyError(package, purpose, installing(EXTRAS[package]))
 
 
 class RunFileError(IapbError):

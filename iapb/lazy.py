@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from iapb.errors import IapbError, MissingDependencyError, name_the_extra
+from iapb.errors import IapbError, MissingDependencyError, installing, name_the_extra
 
 
 def lazy_names(
@@ -53,8 +53,7 @@ def needed(module: str, purpose: str) -> Any:
     except ModuleNotFoundError as error:
         named = name_the_extra(error, purpose)
         if named is error:
-            package = module.partition(".")[0]
-            named = MissingDependencyError(package, purpose, f"pip install {package}")
+            named = MissingDependencyError(str(error.name), purpose, installing("all"))
         raise named from error
 
 
@@ -75,7 +74,7 @@ def extension(group: str, name: str) -> Any:
     """Load the object that an installed package offers as an entry point; upper packages extend lower ones this way."""
     for found in load_extensions(group, name):
         return found
-    raise MissingDependencyError("iapb[report]", f"{group}: {name}", "pip install 'iapb[report]'")
+    raise MissingDependencyError("the extra report", f"{group}: {name}", installing("report"))
 
 
 def load_extensions(group: str, name: str = "") -> list[Any]:

@@ -18,6 +18,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.errors import name_the_extra
 from iapb.lazy import extension, needed
 from iapb.schema import Booleans, Floats, Integers, Quantity, States, along, quantities
 
@@ -253,7 +254,10 @@ class Run:
         -------
         Path
         """
-        return extension("iapb.files", "write")(path, self, replace=replace)
+        try:
+            return extension("iapb.files", "write")(path, self, replace=replace)
+        except ModuleNotFoundError as error:
+            raise name_the_extra(error, "Run.save") from error
 
 
 # Labels of the arrays of a run, for its file and for `Run.to_xarray`

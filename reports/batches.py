@@ -20,7 +20,7 @@ from threading import Thread
 from typing import Any
 
 from iapb.compiling import tell_from_worker
-from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from iapb.errors import ArgumentError, IapbError, MissingDependencyError, installing
 
 Results = Generator[tuple[Any, Any]]
 Scheduler = Callable[[Callable[[Any], Any], Iterable[Any]], Results]
@@ -65,7 +65,7 @@ def cluster(address: str) -> Scheduler:
             from distributed.comm import CommClosedError
         except ImportError as error:
             raise MissingDependencyError("distributed", "A sweep on a cluster",
-                                         "pip install 'iapb[cluster]'") from error
+                                         installing("cluster")) from error
         for name in _LOUD:  # if the scheduler dies, print one sentence of ours without dask's tracebacks
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:

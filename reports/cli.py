@@ -41,6 +41,12 @@ COMMANDS = {
     "report": "Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if some differ.",
 }  # fmt: skip
 
+GROUPS = {  # of the help, in its order
+    "Simulate": ("run", "check", "scenes", "schema", "effects", "live", "sweep"),
+    "Look at runs": ("inspect", "certify", "compare", "store"),
+    "Verify": ("verify", "prove", "bench"),
+    "The paper": ("reproduce", "report"),
+}
 
 # Many scenes share kernels compiled whole (see `iapb.compiled`); other commands compile what one scene needs.
 MANY_SCENES = ("verify", "bench", "sweep", "store", "reproduce")
@@ -77,10 +83,11 @@ def _app(given: list[str]) -> typer.Typer:
     if wanted in MANY_SCENES:
         os.environ.setdefault("IAPB_COMPILE", "whole")
     for name, words in COMMANDS.items():
+        panel = {"rich_help_panel": next(title for title, names in GROUPS.items() if name in names)}
         if name == wanted:
-            app.command(name)(_answering(getattr(import_module(f"reports.commands.{name}"), name)))
+            app.command(name, **panel)(_answering(getattr(import_module(f"reports.commands.{name}"), name)))
         else:
-            app.command(name, help=words)(lambda: None)  # only listed in the help
+            app.command(name, help=words, **panel)(lambda: None)  # only listed in the help
     return app
 
 

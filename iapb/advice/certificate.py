@@ -103,7 +103,8 @@ class Certificate:
         reported = " (only reported)" * (not np.isnan(self.restitution))
         open_ = [name + reported * (name == "restitution") for name, share in shares if np.isnan(share)]
         fits = f" Recorded impulses and velocities do not fit: {'; '.join(wrong)}." if wrong else ""
-        return (f"{energy} (exact). Certified: {'; '.join(held) or 'nothing'}.{fits} "
+        springs = " Springs return stored energy: judge such a contact from first touch to last." * bool(self.gains)
+        return (f"{energy} (exact).{springs} Certified: {'; '.join(held) or 'nothing'}.{fits} "
                 f"Not judged: {'; '.join([*open_, 'forces between impacts'])}.")
 
 

@@ -29,9 +29,9 @@ SIMULATORS: dict[str, str] = {
 
 
 def find_simulator(name: str) -> Simulator:
-    """Return the adapter of that name; the engine itself is imported at its first use."""
-    if name not in SIMULATORS:
-        raise ArgumentError("simulator", name, one_of(name, SIMULATORS))
-    module, kind = SIMULATORS[name].split(":")
+    """Return the adapter of that name, or your own as ``module:Class``; its engine is imported at its first use."""
+    if name not in SIMULATORS and ":" not in name:
+        raise ArgumentError("simulator", name, f"{one_of(name, SIMULATORS)}, or your own as module:Class")
+    module, _, kind = SIMULATORS.get(name, name).partition(":")
     made: Simulator = getattr(import_module(module), kind)()
     return made

@@ -14,7 +14,7 @@ from importlib.metadata import version
 from math import atan2, exp, log, pi, sqrt
 from typing import Any
 
-from iapb.errors import ArgumentError, MissingDependencyError
+from iapb.errors import ArgumentError, MissingDependencyError, installing
 from reference.simulators.scene import FixedScene
 from reference.simulators.trajectory import Trajectory
 
@@ -59,7 +59,7 @@ class Simulator:
             return import_module(self.module)
         except ImportError as error:
             purpose = f"The adapter of {self.package}"
-            raise MissingDependencyError(self.package, purpose, "pip install 'iapb[peers]'") from error
+            raise MissingDependencyError(self.package, purpose, installing("peers")) from error
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the engine's best settings for the scene; if `step` [s] is given, the best ones at this step."""

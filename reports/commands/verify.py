@@ -50,7 +50,8 @@ def verify(
     allow_code: Annotated[bool, typer.Option(
         "--allow-code", help="With --recheck: import and call the resolver named in the file.")] = False,
     simulator: Annotated[list[str] | None, typer.Option(
-        help="Test an engine on the fixed scenes instead: mujoco, drake, ... or all; may be repeated.")] = None,
+        help="Test an engine on the fixed scenes instead: mujoco, drake, ..., all, or your adapter as module:Class; "
+             "may be repeated.")] = None,
     scene: Annotated[list[str] | None, typer.Option(
         help="With --simulator: only this fixed scene; may be repeated.")] = None,
     json_: Json = False,
@@ -116,7 +117,7 @@ def _kept(passed: bool) -> str:
 def count_in_words(count: LawCount) -> str:
     """Return as text how many of the cases broke a law, and the worst residual as a share of its tolerance."""
     worst = count.worst
-    nearest = "" if worst is None else f", worst {worst.value:.2e} of {worst.tolerance:.2e} ({worst.ratio:.3f} of it)"
+    nearest = "" if worst is None else f"; worst {worst.words}"
     return f"{count.law}: {count.failures:,} of {count.checked:,} break it{nearest}"
 
 
@@ -128,7 +129,7 @@ def _rechecked(path: Path, allow_code: bool) -> Answer:
     laws = [{"law": law, "passed": residual.passed, "value": residual.value, "tolerance": residual.tolerance}
             for law, residual in judged]
     return Answer({"laws": laws, "passed": passed},
-                  [f"  {_kept(residual.passed)} {law}: {residual.value:.2e} of {residual.tolerance:.2e}"
+                  [f"  {_kept(residual.passed)} {law}: {residual.words}"
                    for law, residual in judged], int(not passed))
 
 
@@ -139,6 +140,8 @@ def _simulators(simulators: Sequence[str], scenes: Sequence[str]) -> Answer:
     for scene in chosen:
         fixed_scene(scene)  # a wrong name raises before anything runs
     for name in names:
+        if ":" in name:
+            function_named("--simulator", name, "package.module:Class")
         simulator = find_simulator(name)
         if "all" not in simulators:
             simulator.version()

@@ -35,7 +35,8 @@ def run_without(missing: set[str], code: str) -> subprocess.CompletedProcess[str
 
 def test_the_extras_of_the_messages_are_those_of_the_project() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    bring = {IMPORTED_AS.get(name, name): extra for extra in ("reference", "verify", "report") for line in extras[extra]
+    bring = {IMPORTED_AS.get(name, name): extra
+             for extra in ("reference", "verify", "report", "all") for line in extras[extra]
              if not (name := line.partition(">")[0]).startswith("iapb")}  # fmt: skip
     assert bring == EXTRAS
 
@@ -51,20 +52,25 @@ print(simulate(find_scene("peg_corner"), steps=5).steps, resolve_impact([[1.0]],
 def test_a_rigid_world_without_its_packages_says_which_extra_brings_them() -> None:
     done = run_without(set(EXTRAS), "from iapb import simulate; simulate('peg_corner', world='ideal', steps=5)")
     assert ("MissingDependencyError: A reference needs scipy, which is not installed. "
-            "Install it with: pip install 'iapb[reference]'") in done.stderr  # fmt: skip
+            "Install it with: pip install '.[reference]' (in a checkout of iapb)") in done.stderr  # fmt: skip
+
+
+def test_saving_a_run_says_which_extra_it_needs() -> None:
+    done = run_without(set(EXTRAS), "from iapb import simulate; simulate('peg_corner', steps=5).save('never.h5')")
+    assert "MissingDependencyError: Run.save needs h5py, which is not installed." in done.stderr
 
 
 def test_a_name_that_needs_an_extra_says_which() -> None:
     done = run_without({"hypothesis"}, "from verification import check_passivity")
     assert ("MissingDependencyError: verification.check_passivity needs hypothesis, which is not installed. "
-            "Install it with: pip install 'iapb[verify]'") in done.stderr  # fmt: skip
+            "Install it with: pip install '.[verify]' (in a checkout of iapb)") in done.stderr  # fmt: skip
 
 
 def test_the_command_without_its_packages_says_so_in_one_sentence() -> None:
     done = run_without({"typer"}, "from iapb.__main__ import main; raise SystemExit(main())")
     assert done.returncode == 1
     assert done.stderr == ("iapb: The command needs typer, which is not installed. "
-                           "Install it with: pip install 'iapb[report]'\n")  # fmt: skip
+                           "Install it with: pip install '.[verify]' (in a checkout of iapb)\n")  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["reference", "verification", "reports"])

@@ -13,7 +13,7 @@ import numpy as np
 from iapb import resolve_impact
 from iapb.compiled import block, copy_into, kernel
 from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance, whiten_impact
-from iapb.errors import MissingDependencyError, SolverError
+from iapb.errors import MissingDependencyError, SolverError, installing
 from iapb.linalg import add_multiple, cholesky, dot_of, from_whitened, to_whitened
 from iapb.schema import zeros_of
 from reference.complementarity import ImpactProblem, solve
@@ -84,7 +84,7 @@ def lemke_call(case: ImpactCase) -> KernelCall:
     try:
         import_lcp_lemke()
     except ImportError as error:
-        raise MissingDependencyError("quantecon", "Lemke kernel", "pip install quantecon") from error
+        raise MissingDependencyError("quantecon", "Lemke kernel", installing("reference")) from error
     from verification.cost.lemke_kernel import repeat_lemke  # brings quantecon
 
     return KernelCall(repeat_lemke, (*case.arrays, case.restitution), np.zeros(case.coordinates))
@@ -101,7 +101,7 @@ def daqp_call(case: ImpactCase) -> Call:
     try:
         import daqp
     except ImportError as error:
-        raise MissingDependencyError("daqp", "DAQP", "pip install 'iapb[reference]'") from error
+        raise MissingDependencyError("daqp", "DAQP", installing("reference")) from error
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     lower, change, unit, least = np.zeros((d, d)), np.zeros(d), np.zeros((c, d)), np.zeros(c)

@@ -26,6 +26,7 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.step import clear, find_contacts, locate, move
+from iapb.errors import installing
 from iapb.haptics.kernels import couple, drive_device
 from iapb.recording import Recorder, make_record, write_step
 from iapb.scene import find_scene, load_scene, scene_from_text
@@ -99,7 +100,7 @@ def race(study: Study, name: str, steps: int = STEPS) -> Iterator[Row]:
 def _races_say(races: Table) -> Iterator[Part]:
     """Yield a part per scene on the form whose fastest solver leaves us the largest ratio."""
     if not races.rows:
-        yield Part("Time of a step compared with MuJoCo: MuJoCo is not installed: pip install 'iapb[peers]'.",
+        yield Part(f"Time of a step compared with MuJoCo: MuJoCo is not installed: {installing('peers')}.",
                    NOT_COMPUTED, timed=True)
     fastest: dict[tuple[str, str], Row] = {}
     for row in sorted(races.records(), key=lambda row: float(row["MuJoCo's step"])):

@@ -39,6 +39,11 @@ class LawResidual:
         return self.value / self.tolerance if self.tolerance > 0.0 else (np.inf if self.value > 0.0 else 0.0)
 
     @property
+    def words(self) -> str:
+        """The value and its tolerance."""
+        return f"error {self.value:.1e}, limit {self.tolerance:.1e}"
+
+    @property
     def passed(self) -> bool:
         """Whether the law holds within its tolerance."""
         return self.ratio <= 1.0

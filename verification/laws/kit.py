@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from iapb.compiling import compiling_told, to_stderr
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from reference.one_thread import one_thread
@@ -31,6 +32,7 @@ from verification.laws.resolver import Resolver, ResolverFault, Watched, own_ans
 from verification.laws.strategies import search_counterexample
 
 NOTABLE = 1e-6  # the search prefers counterexamples with a residual above this, which rounding cannot explain
+SINGLE = 3  # broken laws from which an answer in single precision is named as the probable cause
 IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
 PATIENCE = 600.0  # [s] ten times as long
 
@@ -70,7 +72,7 @@ class LawVerdict(LawCount):
 
     def __str__(self) -> str:
         mark = "kept  " if self.passed else "BROKEN"
-        worst = f"worst {self.worst.value:.2e} of {self.worst.tolerance:.2e}" if self.worst else "-"
+        worst = f"worst {self.worst.words}" if self.worst else "-"
         within = self.failures - self.severe
         grades = f" ({self.severe} by more than rounding, {within} within it)" if within else ""
         line = f"  {mark} {self.statement}: {self.failures} of {self.checked} impacts break it{grades}, {worst}"
@@ -190,10 +192,23 @@ class PassivityReport(str):
         if worst.worst is not None and worst.worst_case is not None:
             family = worst.worst_case.family or "an impact"
             lines.append(f"  worst case: {worst.law} at {worst.worst.ratio:.2g} of its tolerance, {family}")
+        lines += [f"  hint: {hint}" for hint in self._hints()]
         if self.counterexample is not None:
             lines += ["", f"counterexample to {self.counterexample_law}:", *_shown(self.counterexample, self.returned)]
             lines += ["", "as a test:", "", self.counterexample_test]
         return "\n".join(lines)
+
+
+    def _hints(self) -> Iterator[str]:
+        """Yield probable causes of failures that are no fault of the resolver's law."""
+        answer, case, broken = self.returned, self.counterexample, self.broken_laws
+        if len(broken) >= SINGLE and not isinstance(answer, str) and np.array_equal(np.float32(answer), answer):
+            yield ("the resolver seems to compute in single precision, the tolerances are for double precision. Widen "
+                   "them: bounds=dataclasses.replace(verification.laws.bounds.KIT, least=1e-4, restitution=1e-4), "
+                   "largest_condition=100")
+        if "kinetic_energy" in broken[:1] and case and case.friction is not None and case.restitution > 0.0:
+            yield ("with e > 0, Coulomb's friction and Newton's restitution together can gain energy, whatever the "
+                   "solver (Kane and Levinson 1985). `laws` can leave kinetic_energy out")
 
 
 def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
@@ -213,6 +228,7 @@ def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) 
         return LawResidual("", np.inf, 0.0), str(fault)
 
 
+@compiling_told(to_stderr)
 def check_passivity(
     resolver: Resolver,
     *,
