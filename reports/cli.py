@@ -83,11 +83,12 @@ def _app(given: list[str]) -> typer.Typer:
     if wanted in MANY_SCENES:
         os.environ.setdefault("IAPB_COMPILE", "whole")
     for name, words in COMMANDS.items():
-        panel = {"rich_help_panel": next(title for title, names in GROUPS.items() if name in names)}
+        group = next(title for title, names in GROUPS.items() if name in names)
         if name == wanted:
-            app.command(name, **panel)(_answering(getattr(import_module(f"reports.commands.{name}"), name)))
+            command = getattr(import_module(f"reports.commands.{name}"), name)
+            app.command(name, rich_help_panel=group)(_answering(command))
         else:
-            app.command(name, help=words, **panel)(lambda: None)  # only listed in the help
+            app.command(name, help=words, rich_help_panel=group)(lambda: None)  # only listed in the help
     return app
 
 

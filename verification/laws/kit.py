@@ -202,7 +202,9 @@ class PassivityReport(str):
     def _hints(self) -> Iterator[str]:
         """Yield probable causes of failures that are no fault of the resolver's law."""
         answer, case, broken = self.returned, self.counterexample, self.broken_laws
-        if len(broken) >= SINGLE and not isinstance(answer, str) and np.array_equal(np.float32(answer), answer):
+        with np.errstate(over="ignore"):
+            single = not isinstance(answer, str) and np.array_equal(np.asarray(answer, np.float32), answer)
+        if len(broken) >= SINGLE and single:
             yield ("the resolver seems to compute in single precision, the tolerances are for double precision. Widen "
                    "them: bounds=dataclasses.replace(verification.laws.bounds.KIT, least=1e-4, restitution=1e-4), "
                    "largest_condition=100")
