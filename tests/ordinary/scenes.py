@@ -573,3 +573,14 @@ SLIDER = {"name": "slider", "parent": "arm", "joint": "prismatic", "axis": [1, 0
           "position": [0.2999], "joint_limits": [0, 0.3]}
 add("slider_on_a_turning_arm", scene(0.5, [ARM, SLIDER], gravity=0.0),
     lambda motion: np.linalg.norm(motion.place[-1, 1]), 0.3, 0.01, "its stop holds it at 0.3 m")
+
+
+def spin_of_landing(w: float, h: float, mu: float, e: float, speed: float) -> float:
+    """Return ω⁺ of a box that lands flat and slides on: its leading corner slips, the other opens [rad/s]."""
+    arm, about = w / 2 - mu * h / 2, (w * w + h * h) / 12  # per unit of mass
+    return (1 + e) * speed / (1 + w / 2 * arm / about) * arm / about
+
+
+add("tall_box_lands_sliding",
+    scene(0.02, [box("box", (0.04, 0.16), 0.2, (0, 0.0805, 0), (3, -1, 0))], [FLOOR], 0.5, 0.5, gravity=0.0),
+    lambda motion: motion.angle()[-1], 0.019 * spin_of_landing(0.04, 0.16, 0.5, 0.5, 1.0), 0.3, "tips", tolerance=0.02)

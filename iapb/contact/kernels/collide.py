@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from iapb.compiled import copy_into, kernel
@@ -21,8 +23,10 @@ from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_ba
 from iapb.contact.kernels.rows import body_row, contact_velocities, direction_row, friction_of, tangent_of
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.contact.kernels.unilateral import poisson_impact
-from iapb.linalg import load
+from iapb.linalg import dot_of, load
 from iapb.run import COLLIDING
+
+OPENS = 1e-9  # share of |u|, and of the largest impulse, above which a contact opens or pulls: far above rounding
 
 
 @kernel
@@ -138,6 +142,64 @@ def add_friction_to_impact(world, state, size, count, rank, only_push):
 
 
 @kernel
+def swap_rows(state, size, i, j):
+    """Exchange two rows of an impact."""
+    work = state.work
+    for k in range(size):
+        work.rows[k, i], work.rows[k, j] = work.rows[k, j], work.rows[k, i]
+    work.length[i], work.length[j] = work.length[j], work.length[i]
+    for each in (state.row_restitution, state.row_impulse):
+        each[i], each[j] = each[j], each[i]
+    state.rows[i], state.rows[j] = state.rows[j], state.rows[i]
+
+
+@kernel
+def keep_together(state, size, count):
+    """Put the rows first that push, or that meet −e γ⁻ after Poisson's law; return how many. The others open."""
+    work, kept = state.work, 0
+    least = OPENS * math.sqrt(dot_of(work.u[:size], work.u[:size]))
+    for r in range(count):
+        open_by = 0.0
+        for k in range(size):
+            open_by += work.rows[k, r] * (work.change[k] + (1.0 + state.row_restitution[r]) * work.u[k])
+        if state.row_impulse[r] > 0.0 or open_by <= least:
+            swap_rows(state, size, kept, r)
+            kept += 1
+    for k in range(size):
+        for r in range(kept):
+            work.columns[k, r] = work.rows[k, r]
+    return kept
+
+
+@kernel(needs="impact_friction", otherwise=(0, 1.0, 1.0, True))
+def push_with_friction(world, state, size, count, smallest, tolerance):
+    """Resolve contacts that only push, with friction; return (rank, clamp, share of friction, solved).
+
+    Friction acts where contacts stay together. Where it would make a contact pull, this contact opens: the impact is
+    resolved again without its row, as a tall box that lands flat and slides tips over its leading edge.
+    """
+    work, f, together = state.work, state.friction_work, count
+    while True:
+        rank, clamp, solved = resolve_unequal(world, state, size, together, smallest, tolerance)
+        if solved:
+            together = keep_together(state, size, together)
+            rank = orthonormal_basis(size, together, tolerance, size, work)
+        share, factor, met = add_friction_to_impact(world, state, size, together, rank, solved)
+        pulls, most = -1, 0.0
+        for r in range(together):
+            most = max(most, f.wanted[r])
+        for r in range(together if solved and not met and together > 1 else 0):
+            if f.wanted[r] < -OPENS * most and (pulls < 0 or f.wanted[r] < f.wanted[pulls]):
+                pulls = r
+        if pulls < 0:
+            break
+        together -= 1
+        swap_rows(state, size, pulls, together)
+    state.row_impulse[together:count] = 0.0
+    return rank, clamp * factor, share, solved and met
+
+
+@kernel
 def resolve_rows(world, state, size, count):
     """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of friction, solved)."""
     work, contacts, e, unequal, solved, friction_share = state.work, state.contacts, world.restitution, False, True, 1.0
@@ -150,6 +212,8 @@ def resolve_rows(world, state, size, count):
             state.row_restitution[r], e, largest = own, min(e, own), max(largest, own)
         unequal = unequal or e < largest
     whiten_impact(size, count, work)
+    if unequal and world.implicit and world.switches.impact_friction and not world.per_body_rows:
+        return push_with_friction(world, state, size, count, e, tolerance)
     if unequal:
         rank, clamp, solved = resolve_unequal(world, state, size, count, e, tolerance)
     else:
@@ -159,7 +223,7 @@ def resolve_rows(world, state, size, count):
         span = rank
         if unequal and solved:  # Poisson's law needs no basis of the rows, friction does
             span = orthonormal_basis(size, count, tolerance, size, work)
-        friction_share, factor, met = add_friction_to_impact(world, state, size, count, span, unequal and solved)
+        friction_share, factor, met = add_friction_to_impact(world, state, size, count, span, False)
         clamp, solved = clamp * factor, solved and met
     elif not (unequal and solved):
         minimum_norm_impulses(size, count, rank, work.length, work.change[:size], state.row_impulse, work)

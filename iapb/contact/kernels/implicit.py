@@ -85,8 +85,10 @@ def rest_group(world, state, group, s):
         if not follow_limits(world, state, count, s, 1.0 if turn < FREE_TURNS else 0.5):
             break
         solved = solve(world, state, size, count, s, k)
-    if not solved:
-        guard(world, state, size, count, s)
+    if not solved:  # what bends is not in the energy that `guard` compares
+        work.bend[:count] = 0.0
+        if not solve(world, state, size, count, s, k):
+            guard(world, state, size, count, s)
     give_back(world, state, size, count, s)
 
 

@@ -13,7 +13,7 @@ from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.linalg import add, dot, load, scale, store
 
 _OVERLAPS = 1e-9  # [m] what must be left without the sag; above the rounding of positions, below a sag that matters
-_LARGEST_SAG = 2e-4  # [m] twice the sag that the chosen stiffness allows; a deeper body has sunk into the next one, too
+_LARGEST_SAG = 5e-5  # [m] well above the sag at the chosen stiffness; a deeper body has sunk into the next one, too
 _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body, too
 
 
@@ -45,14 +45,19 @@ def explained(world, state, i, count):
     """Whether the pair of contact i does not overlap once one of its bodies is lifted out of a resting contact."""
     contacts, n = state.contacts, load(state.contacts.normal, i)
     for j in range(count):
-        normal = load(contacts.normal, j)
-        if (contacts.is_new[j] or contacts.gap[j] < -_LARGEST_SAG or is_stop(contacts, j)
-                or dot(n, normal) > _SAME_NORMAL):
+        normal, sag, old = load(contacts.normal, j), 0.0, False
+        if is_stop(contacts, j) or dot(n, normal) > _SAME_NORMAL:
+            continue
+        for k in range(count):  # of this surface: the deepest contact, and whether one lasts
+            if (contacts.body_a[k] == contacts.body_a[j] and contacts.body_b[k] == contacts.body_b[j]
+                    and dot(load(contacts.normal, k), normal) > _SAME_NORMAL):
+                sag, old = max(sag, -contacts.gap[k]), old or not contacts.is_new[k]
+        if not old or sag > _LARGEST_SAG:
             continue
         for body, sign in ((contacts.body_a[j], 1.0), (contacts.body_b[j], -1.0)):
             if body >= 0 and (body == contacts.body_a[i] or body == contacts.body_b[i]):
                 here = load(state.body.position, body)
-                store(state.body.position, body, add(here, scale(-sign * contacts.gap[j], normal)))
+                store(state.body.position, body, add(here, scale(sign * sag, normal)))
                 apart = is_apart(world, state, contacts.shape_a[i], contacts.shape_b[i])
                 store(state.body.position, body, here)
                 if apart:
