@@ -29,6 +29,7 @@ OUR_OWN = ("iapb", "rigid")  # simulators of this project: their exceptions are 
 # that a user would not notice, and far above rounding.
 CLOSE = 1e-2
 STAYS = 1e-3  # [m] a hundredth of the bodies' size
+FLIES, THROWN = 1.0, "thrown out"  # [m] a body that moves farther has left the scene; how far depends on the duration
 _ERRORS = ("energy", "momentum", "velocity")
 MEASURES = ("energy error", "largest rise of energy", "momentum error", "velocity error", "overlap / size",
             "drift [m]", "creep [m]")  # of a motion, see `measured`
@@ -151,10 +152,12 @@ def verdict(record: EngineRecord) -> str:
 
 
 def row_of(record: EngineRecord) -> Row:
-    """Return the row of a record."""
+    """Return the row of a record; a body that is thrown out has no drift."""
+    thrown = (record.measures.get("drift [m]") or 0.0) > FLIES
+    found = record.measures | (dict.fromkeys(("drift [m]", "creep [m]")) if thrown else {})
     return {"engine": record.title, "version": record.version, "scene": record.scene.replace("_", " "),
-            "settings": record.choice, "law": verdict(record), **dict.fromkeys(MEASURES), **record.measures,
-            "simulated [s]": record.duration or None, "failure": record.failure}  # fmt: skip
+            "settings": record.choice, "law": verdict(record), **dict.fromkeys(MEASURES), **found,
+            "simulated [s]": record.duration or None, "failure": THROWN if thrown else record.failure}  # fmt: skip
 
 
 def sentence(rows: Sequence[Row]) -> str:
@@ -169,7 +172,7 @@ def sentence(rows: Sequence[Row]) -> str:
 def _worst(row: Row) -> str:
     """The measure with the largest error in words, or the failure."""
     if row["failure"]:
-        return "failed: " + row["failure"].rstrip(".")
+        return THROWN if row["failure"] == THROWN else "failed: " + row["failure"].rstrip(".")
     if row["drift"] is not None:
         return f"moves by {row['drift']:.3g} m"
     size, name = max(((abs(row[f"{name} error"]), name) for name in _ERRORS), key=lambda one: one[0])

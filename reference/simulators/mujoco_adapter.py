@@ -17,7 +17,11 @@ OWN_STEP, STACK_STEP, DEFAULT_STEP = 1e-5, 2e-5, 2e-3  # [s] for bouncing, for t
 OWN_STEPS_OF_AN_IMPACT = 100.0
 GIVEN_STEPS_OF_AN_IMPACT = 8.0  # the best of 3, 5, 8, 12 and 20 at 1 ms, over the impact scenes
 HARD = "0.9999 0.9999 0.001 0.5 2"  # solimp: the largest impedance that MuJoCo accepts
-MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the default impedance is too small to carry the load
+SOFT = "0.9 0.95 0.001 0.5 2"  # solimp: the default
+# solref and solimp at rest: what moves least, of time constants of 2 steps, 5, 10, 20 and 50 ms times damping ratios of
+# 1, 2, 5, 10 and 20, with each solimp. A heavy stack at 1 ms needs the second, at 20 µs the first.
+AT_REST, LOADED_AT_GIVEN_STEP = ("{:g} 1", HARD), ("0.005 10", SOFT)
+MANY_TIMES_HEAVIER = 1e3  # mass ratio of a heavy stack
 
 
 class MuJoCo(Simulator):
@@ -26,13 +30,13 @@ class MuJoCo(Simulator):
     title, module, package = "MuJoCo", "mujoco", "mujoco"
 
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
-        """Return defaults at rest, hard contacts for the stack, and for impacts a negative solref with damping."""
+        """Return what moves least at rest, and for impacts a negative solref with damping."""
         common: dict[str, str | float] = {"condim": 1.0, "integrator": "Euler", "tolerance": 1e-12}
-        if scene.rests and np.ptp(scene.masses) < MANY_TIMES_HEAVIER * scene.masses.min():
-            return Settings(step or DEFAULT_STEP, {**common, "solref": "0.02 1", "solimp": "0.9 0.95 0.001 0.5 2"})
         if scene.rests:
-            chosen = step or STACK_STEP
-            return Settings(chosen, {**common, "solref": f"{2.0 * chosen:g} 1", "solimp": HARD})
+            loaded = np.ptp(scene.masses) >= MANY_TIMES_HEAVIER * scene.masses.min()
+            chosen = step or (STACK_STEP if loaded else DEFAULT_STEP)
+            solref, solimp = LOADED_AT_GIVEN_STEP if loaded and step else AT_REST
+            return Settings(chosen, {**common, "solref": solref.format(2.0 * chosen), "solimp": solimp})
         chosen, steps = (step, GIVEN_STEPS_OF_AN_IMPACT) if step else (OWN_STEP, OWN_STEPS_OF_AN_IMPACT)
         stiffness = (pi / (steps * chosen)) ** 2
         damping = damping_for(scene.restitution, stiffness)

@@ -151,11 +151,13 @@ class Bounds:
 
         Whitening causes an error ε κ(M) (Cholesky's backward error); a direction of singular value σ has an error
         ε √κ(M) / σ. Rows that are dependent up to a noise below 1e-13 span directions that differ by noise / σ; the
-        factor 1 + e = 2 doubles this.
+        factor 1 + e = 2 doubles this. A resolver may use any r independent rows of c: of the best r rows, the smallest
+        σ is only known to be σ_min / √(1 + r (c − r)) or more (Gu and Eisenstat 1996, with f = 1).
         """
-        root = np.sqrt(case.condition)
-        rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / case.smallest_motion))
-        noise = 4.0 * float(np.sqrt(max(case.contacts, 1))) * case.largest_noise / case.smallest_motion
+        root, rank = np.sqrt(case.condition), len(case.row_space)
+        smallest = case.smallest_motion / np.sqrt(1.0 + rank * (case.contacts - rank))
+        rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / smallest))
+        noise = 4.0 * float(np.sqrt(max(case.contacts, 1)) * case.largest_noise / smallest)
         return max(self.least, rounding + noise)
 
 

@@ -73,16 +73,21 @@ def _sweep_lines(w, b, bilateral, p, sweeps, still):  # type: ignore[no-untyped-
     return -1
 
 
-def _on_cones(problem: ImpactProblem) -> Answer:
+def settles(problem: ImpactProblem, sweeps: int) -> bool:
+    """Whether one of the first sweeps over the friction cones changes nothing."""
+    return _on_cones(problem, sweeps).note.startswith("converged")
+
+
+def _on_cones(problem: ImpactProblem, sweeps: int = _SWEEPS) -> Answer:
     size, k = problem.contact_size, problem.contacts
     blocks = problem.delassus.reshape(k, size, k, size)[np.arange(k), :, np.arange(k)]
     inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2))
     inertia[inertia == 0.0] = 1.0
     p = np.zeros(problem.size)
     done = _sweep_cones(np.ascontiguousarray(problem.delassus), problem.offset, problem.friction_or_zero,
-                        problem.two_sided, inertia, problem.relaxed, p, np.zeros(size), np.zeros(size), _SWEEPS,
+                        problem.two_sided, inertia, problem.relaxed, p, np.zeros(size), np.zeros(size), sweeps,
                         _STILL_ON_CONES * velocity_scale(problem))  # fmt: skip
-    return Answer(p, f"converged after {done} sweeps" if done >= 0 else f"not converged after {_SWEEPS} sweeps")
+    return Answer(p, f"converged after {done} sweeps" if done >= 0 else f"not converged after {sweeps} sweeps")
 
 
 @numba.njit(cache=True, fastmath=False)

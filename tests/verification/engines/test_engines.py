@@ -84,9 +84,10 @@ def test_another_engine_that_stops_is_a_result_and_our_own_a_failure(monkeypatch
 def test_the_answer_names_every_miss_ours_first():
     """"31 of 32" hid that the one miss was ours, by 97 m."""
     (ours, _) = compare_engines(["iapb"], ["redundant_wedge"])
-    moved = replace(ours, measures={"drift [m]": 97.0}, scene="heavy_stack")
-    other = replace(ours, engine="other", title="Another", measures={"drift [m]": 5.7}, choice="matched")
+    moved = replace(ours, measures={"drift [m]": 97.0, "creep [m]": 60.0}, scene="heavy_stack")
+    other = replace(ours, engine="other", title="Another", measures={"drift [m]": 0.24}, choice="matched")
     _, answer = judged([other, moved])
-    assert answer.endswith("Missed by iapb (ours): heavy stack moves by 97 m with its own settings; "
-                           "by Another: redundant wedge moves by 5.7 m at a step of 1 ms.")
+    assert answer.endswith("Missed by iapb (ours): heavy stack thrown out with its own settings; "
+                           "by Another: redundant wedge moves by 0.24 m at a step of 1 ms.")
+    assert (row_of(moved)["drift [m]"], row_of(moved)["creep [m]"], row_of(moved)["law"]) == (None, None, "missed")
     assert "Missed" not in judged([ours])[1]
