@@ -76,7 +76,7 @@ pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
 	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) -q $(PYTEST_ARGS)
 
 .PHONY: deep
-deep: setup ## the test suite with long property searches
+deep: setup ## the test suite with long property searches, and the kit on sound resolvers at 100 seeds (hours)
 	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) -q $(PYTEST_ARGS)
 
 .PHONY: format

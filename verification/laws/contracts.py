@@ -86,7 +86,8 @@ def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
     if not every.is_separated or case.speed == 0.0:
         return None
     seen = every.row_space.T @ (every.row_space @ _change(case, resolver))
-    return distance_from_cone(case, seen / case.speed), bounds.restitution
+    distance = distance_from_cone(case, seen / case.speed)
+    return None if np.isnan(distance) else (distance, bounds.restitution)
 
 
 def distance_from_cone(case: ImpactCase, target: Floats) -> float:
@@ -95,7 +96,8 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     The method is least squares over rays of the cones. With two tangents, each iteration adds two rays per contact: one
     along the friction found, and one in the direction that reduces the remainder most. It cannot tell rays apart that
     are close to parallel; accelerated projected gradients (O'Donoghue and Candès 2015) finish the search. Every p found
-    lies inside the cones, so the distance is never too small. If the target lies in the cones, it is NEAR or less.
+    lies inside the cones, so the distance is never too small. It is NEAR or less if the target lies in the cones, and
+    NaN if the search ends before it can tell.
     """
     m = 0 if case.tangents is None else case.tangents.shape[1]
     tangents = case.with_tangents.rows[case.contacts :].reshape(case.contacts, m, case.coordinates)  # T L⁻ᵀ
@@ -115,11 +117,15 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
         directions = np.concatenate([fixed, more], axis=1)
     blocks = np.concatenate([case.rows[:, None], tangents], axis=1)
     push = np.concatenate([p.sum(1)[:, None], friction[:, None] * np.einsum("ck,ckm->cm", p, used)], axis=1)
-    return min(distance, _descend(blocks, friction, target, push))
+    return _descend(blocks, friction, target, push)
 
 
 def _descend(blocks: Floats, friction: Floats, target: Floats, p: Floats) -> float:
-    """Return the least |Aᵀp − target| that steps from p (c, 1 + m) find, inside the cones."""
+    """Return the least |Aᵀp − target| that steps from p (c, 1 + m) find, inside the cones, or NaN.
+
+    With r = target − Aᵀp, no p' has a remainder below (target·r − max over p' of p'·(A r)) / |r|. The search ends when
+    this shows that no p' up to ten times as large as p halves the distance.
+    """
     size = np.linalg.norm(blocks, axis=(1, 2))[:, None]
     size[size == 0.0] = 1.0
     rows, p = (blocks / size[:, :, None]).reshape(-1, len(target)), p * size
@@ -132,12 +138,12 @@ def _descend(blocks: Floats, friction: Floats, target: Floats, p: Floats) -> flo
         gained = (rows @ rest).reshape(p.shape)
         most = float(np.max(gained[:, 0] + friction * np.linalg.norm(gained[:, 1:], axis=1), initial=0.0))
         if nearest <= NEAR or target @ rest - 10.0 * tried[:, 0].sum() * most > 0.5 * rest @ rest:
-            break  # near enough, or no p up to ten times as large halves the distance
+            return nearest
         if np.sum((moved - tried) * (tried - p)) > 0.0:
             pace = 1.0
         faster = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * pace * pace))
         moved, p, pace = tried + (pace - 1.0) / faster * (tried - p), tried, faster
-    return nearest
+    return float("nan")
 
 
 def _inside(p: Floats, friction: Floats) -> Floats:
