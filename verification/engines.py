@@ -154,7 +154,7 @@ def verdict(record: EngineRecord) -> str:
 def row_of(record: EngineRecord) -> Row:
     """Return the row of a record; a body that is thrown out has no drift."""
     thrown = (record.measures.get("drift [m]") or 0.0) > FLIES
-    found = record.measures | (dict.fromkeys(("drift [m]", "creep [m]")) if thrown else {})
+    found = {**record.measures, **(dict.fromkeys(("drift [m]", "creep [m]")) if thrown else {})}
     return {"engine": record.title, "version": record.version, "scene": record.scene.replace("_", " "),
             "settings": record.choice, "law": verdict(record), **dict.fromkeys(MEASURES), **found,
             "simulated [s]": record.duration or None, "failure": THROWN if thrown else record.failure}  # fmt: skip
