@@ -10,12 +10,14 @@ from typing import Any
 from iapb.errors import harmless
 
 _listening: list[bool] = []  # not empty: a listener reports already
+_begun: list[bool] = []  # not empty: this process has said that it compiles
+WORTH_SAYING = 1.0  # [s] of compiling
 BEGIN = "Compiling kernels (seconds to a minute or two); they are cached for the next time ..."
 
 
 @contextmanager
 def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
-    """Call say(line) when this process starts to compile a kernel, and at the end with the total compile time.
+    """Call say(line) when this process first compiles a kernel, and at the end with the time if it is WORTH_SAYING.
 
     A kernel from numba's cache is not compiled and not reported.
     """
@@ -24,14 +26,19 @@ def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
     if _listening:
         yield
         return
-    listener = _listener(lambda: say(BEGIN))
+    def say_once() -> None:
+        if not _begun:
+            _begun.append(True)
+            say(BEGIN)
+
+    listener = _listener(say_once)
     _listening.append(True)
     try:
         with event.install_listener("numba:compile", listener):
             yield
     finally:
         _listening.pop()
-        if listener.done:
+        if listener.done and listener.duration >= WORTH_SAYING:
             say(f"Compiling took {listener.duration:.1f} s.")
 
 

@@ -8,6 +8,7 @@ import numba
 import numpy as np
 import pytest
 
+from iapb import compiling
 from iapb.compiled import Entry
 from iapb.compiling import BEGIN, compiling_told, tell_from_worker
 from iapb.contact.laws import StepResult
@@ -20,9 +21,11 @@ needs_compiler = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels ar
 
 
 @needs_compiler
-def test_compiling_is_told_once_however_many_kernels_and_by_one_worker(capsys):
+def test_compiling_is_told_once_however_many_kernels_and_by_one_worker(capsys, monkeypatch):
     from numba.core import event
 
+    monkeypatch.setattr(compiling, "_begun", [])  # whatever this process has said before
+    monkeypatch.setattr(compiling, "WORTH_SAYING", 0.0)
     inner = numba.njit(lambda x: x + 1.0)
     outer = numba.njit(lambda x: inner(x) * 2.0)
     lines = []
@@ -31,6 +34,9 @@ def test_compiling_is_told_once_however_many_kernels_and_by_one_worker(capsys):
     assert lines[0] == BEGIN and len(lines) == 2 and lines[1].startswith("Compiling took ")
     with compiling_told(lines.append):
         outer(3.0)  # compiled already
+    monkeypatch.setattr(compiling, "WORTH_SAYING", 1e3)
+    with compiling_told(lines.append):
+        outer(1j)  # too quick to be worth a word
     outer(np.float32(1.0))  # nobody listens any more
     assert len(lines) == 2
     told, before = multiprocessing.Value("b", False), list(event._registered["numba:compile"])
