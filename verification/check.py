@@ -119,8 +119,8 @@ class Check:
     counts: Collection[str] = ()
     timed: Collection[str] = ()
     prose: Collection[str] = ()
-    roles: Mapping[str, str] = field(default_factory=dict)
-    named: Mapping[str, str] = field(default_factory=dict)
+    roles: Mapping[str, str] = field(default_factory=dict, hash=False)
+    named: Mapping[str, str] = field(default_factory=dict, hash=False)
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
     prepare: Callable[[Study, Sequence[Any]], object] | None = None
     rule: Callable[[Iterable[bool | None]], str] = verdict_of_law

@@ -177,7 +177,7 @@ def test_a_run_is_saved_by_what_an_installed_package_offers(monkeypatch):
 
     run = simulate("peg_corner", steps=3)
     monkeypatch.setattr(lazy, "entry_points", lambda **asked: [])
-    with pytest.raises(MissingDependencyError, match=r"iapb\[report\]"):
+    with pytest.raises(MissingDependencyError, match=r"\[report\]"):
         run.save("run.h5")
 
     class Offered:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from iapb.errors import MissingDependencyError
 from iapb.scene import find_scene, load_scene
 from reference.simulators import siconos_adapter
 from reports import provenance, report
@@ -132,8 +133,11 @@ def test_paths_of_a_machine_are_cut_from_the_command(word: str, kept: str, monke
 
 
 def test_the_version_of_siconos_is_that_of_its_adapter(monkeypatch: pytest.MonkeyPatch) -> None:
-    for told, shown in (("4.4.0", "4.4.0"), ("", provenance.NOT_INSTALLED)):
-        monkeypatch.setattr(siconos_adapter, "_version", lambda told=told: told)
+    def absent(_: object) -> None:
+        raise MissingDependencyError("siconos", "The test", "apt-get")
+
+    for told, shown in ((lambda _: {"version": "4.4.0"}, "4.4.0"), (absent, provenance.NOT_INSTALLED)):
+        monkeypatch.setattr(siconos_adapter, "ask", told)
         assert provenance.collect_provenance(packages=("siconos",))["siconos"] == shown
 
 

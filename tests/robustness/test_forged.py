@@ -337,7 +337,8 @@ def test_streams_that_end_or_are_full_blame_no_file(line: str, status: str, said
 
 
 def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path: Path) -> None:
-    program = ("import sys, pathlib\nfrom tests.robustness.faults import put, sample_run\nsample_run()\n"
+    program = ("import signal, sys, pathlib\nfrom tests.robustness.faults import put, sample_run\nsample_run()\n"
+               "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a process in the background ignores it
                "print('go', flush=True)\nfor number in range(10**6): put(pathlib.Path(sys.argv[1]), number)")
     for attempt in range(4):
         child = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], cwd=ROOT, stdout=subprocess.PIPE,
@@ -345,7 +346,10 @@ def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path: Path) -> None:
         assert child.stdout is not None and child.stdout.readline() == "go\n"
         time.sleep(0.3 + 0.05 * attempt)
         child.send_signal(signal.SIGINT)
-        _, said = child.communicate(timeout=20)
+        try:
+            _, said = child.communicate(timeout=20)
+        finally:
+            child.kill()
         assert child.returncode == -signal.SIGINT and "ignored" not in said, said
 
 

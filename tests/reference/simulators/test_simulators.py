@@ -103,7 +103,7 @@ def test_damping_gives_the_restitution_asked_for(restitution):
 @pytest.mark.parametrize(("name", "module"), [("mujoco", "mujoco"), ("bullet", "pybullet"), ("drake", "pydrake")])
 def test_missing_engine_says_how_to_install_it(monkeypatch, name, module):
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(MissingDependencyError, match=r"iapb\[peers\]"):
+    with pytest.raises(MissingDependencyError, match=r"\[peers\]"):
         find_simulator(name).version()
 
 
