@@ -106,20 +106,24 @@ class Film:
         steps = _moments(self.run, _MOMENTS)
         shares = self.run.time[steps] / self.end
         shares[-1] = 1.0  # a run that ended early stays as it is
-        times = ";".join(f"{share:.4f}".rstrip("0").rstrip(".") for share in shares)
+        times = [f"{share:.4f}".rstrip("0").rstrip(".") for share in shares]
         own = self.scale * _sign(self.run) * np.array([1.0, -1.0])
         look = f'fill="{css(PEG)}" stroke="{css(INK)}" stroke-width="1.6" fill-opacity="0.8"'
         for k, body in enumerate(self.run.scene_resolved["bodies"]):
             rings = [own * outline(shape) for shape in body["shapes"]]
             rings += [own * (np.array(shape["center"])[:2] + [[0.0, 0.0], [shape["radius"], 0.0]])
                       for shape in body["shapes"] if shape["kind"] == "circle"]
-            places = ";".join(f"{x:.1f} {y:.1f}" for x, y in self.flat(self.run.pose[steps, k, :2]))
-            turns = ";".join(f"{angle:.1f}" for angle in -np.degrees(self.run.pose[steps, k, 2]))
-            moved, turned = (
-                f'<animateTransform attributeName="transform" type="{kind}" values="{values}" keyTimes="{times}" '
-                f'dur="{self.slower * self.end:g}s" repeatCount="indefinite"/>'
-                for kind, values in (("translate", places), ("rotate", turns)))
+            places = [f"{x:.1f} {y:.1f}" for x, y in self.flat(self.run.pose[steps, k, :2])]
+            turns = [f"{angle:.1f}" for angle in -np.degrees(self.run.pose[steps, k, 2])]
+            moved, turned = (self.animated("translate", places, times), self.animated("rotate", turns, times))
             yield f'<g>{moved}<g><path {look} d="{"".join(map(_ring, rings))}"/>{turned}</g></g>'
+
+    def animated(self, kind: str, values: Sequence[str], times: Sequence[str]) -> str:
+        """Return the change of a transform; while it stands still, its first and last moments are enough."""
+        kept = [k for k in range(len(values)) if k in (0, len(values) - 1) or len({*values[k - 1 : k + 2]}) > 1]
+        listed = (";".join(each[k] for k in kept) for each in (values, times))
+        return (f'<animateTransform attributeName="transform" type="{kind}" values="{next(listed)}" '
+                f'keyTimes="{next(listed)}" dur="{self.slower * self.end:g}s" repeatCount="indefinite"/>')
 
     def marks(self) -> Iterator[str]:
         """Yield the contacts at a moment and the impulses since the one before: of the strongest ones, a dot and a line

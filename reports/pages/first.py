@@ -20,7 +20,7 @@ ERRATA = (
     "The energy loss in (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. Impulses by (13) "
     "and (14) do not conserve momentum. The printed formula can gain energy by rounding."
 )
-LIMIT = "This does not hold for springs and time stepping: see what we miss."
+LIMIT = "Springs and time stepping can still add energy: see what we miss."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
 COUNTED = dict(zip(KINDS, (
     "hold{s}", "hold{s}, with a misprint in the printed formula", "hold{s} in a stated range of conditions",
@@ -59,7 +59,7 @@ def answer(evidence: Evidence) -> Answer:
     claims = {claim.key: claim for claim in evidence.claims}
     found = [*_forces(claims.get("C11")), *_path(claims.get("C10"))]
     if any(topic.key == "exact-energy" and topic.verdict == REPRODUCED for topic in evidence.topics):
-        found.append((True, "No impact of the engine ever gained energy."))
+        found.append((True, "None of the impacts that we tested gained energy."))
     holds, fails = (" ".join(text for held, text in found if held is wanted) for wanted in (True, False))
     return Answer(holds, fails)
 

@@ -293,7 +293,7 @@ def test_the_facts_name_our_own_misses_the_gravest_first() -> None:
 
     safe, lacking = topic("exact-energy", REPRODUCED), topic("haptic-rate", NOT_COMPUTED)
     found = {fact.label: fact for fact in facts(Evidence(topics=(safe, lacking), provenance={"commit": "c" * 40}))}
-    assert answer(Evidence(topics=(safe,))).holds == "No impact of the engine ever gained energy."
+    assert answer(Evidence(topics=(safe,))).holds == "None of the impacts that we tested gained energy."
     assert found["Is it safe?"].text == f"a {LIMIT}" and "Is it fast?" not in found
     assert found["What we miss"].text == "Not computed: haptic-rate."
     assert found["Made from"].text == f"commit {'c' * 12}"
