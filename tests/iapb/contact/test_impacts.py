@@ -85,14 +85,14 @@ def test_exact_passivity_costs_no_restitution(kappa: float) -> None:
         assert exact_change(M, v, found.velocity) <= 0
 
 
-@pytest.mark.parametrize("kappa", [1e8, 1e12])
+@pytest.mark.parametrize("kappa", [1e8, 1e14])
 def test_poissons_law_is_complete_only_if_no_contact_closes(kappa: float) -> None:
     found = []
-    for M, J, v in ill_conditioned(kappa, 300):
+    for M, J, v in ill_conditioned(kappa, 1000):
         impact = resolve_impact(M, J, v, np.linspace(0.0, 1.0, len(J)), method="poisson")
         found.append((impact.status, -(J @ impact.velocity).min() <= 1e-6 * np.abs(J @ v).max()))
     assert ("complete", False) not in found and ("complete", True) in found
-    assert kappa < 1e10 or ("not solved", False) in found
+    assert kappa < 1e10 or ("not solved", False) in found  # some 12 of 1000, whatever rounds the draws
 
 
 @pytest.mark.parametrize("seed", range(30))
