@@ -116,13 +116,13 @@ def _both(name: str, scene_name: str, depth: str) -> list[EngineRecord]:
 def measured(scene: FixedScene, motion: Trajectory) -> dict[str, Any]:
     """Return the measures of a motion; those that do not apply to the scene are None.
 
-    energy error : (kinetic energy at the end − true) / kinetic energy at the start; impact scenes
-    largest rise of energy : of kinetic plus potential energy above its start value, relative to the kinetic energy at
-        the start, or in resting scenes to the work of gravity along the scene's length
-    momentum error : |momentum at the end − true| / sum of m |v| at the start; impact scenes
-    velocity error : largest error of a body's final velocity / largest speed at the start; impact scenes
-    overlap / size : deepest overlap / the scene's length
-    drift : largest distance of a body from its start; creep : drift in the second half; resting scenes
+    - energy error: (kinetic energy at the end − true) / kinetic energy at the start; impact scenes
+    - largest rise of energy: of kinetic plus potential energy above its start value, relative to the kinetic energy at
+      the start, or in resting scenes to the work of gravity along the scene's length
+    - momentum error: (momentum at the end − true), by size, / sum of m v at the start; impact scenes
+    - velocity error: largest error of a body's final velocity / largest speed at the start; impact scenes
+    - overlap / size: deepest overlap / the scene's length
+    - drift: largest distance of a body from its start; creep: drift in the second half; resting scenes
     """
     kinetic, masses = motion.kinetic_energy(scene), scene.masses
     energy = kinetic + motion.potential_energy(scene)

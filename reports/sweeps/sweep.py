@@ -41,8 +41,7 @@ _MEASURES = ("impacts", "energy_lost [J]", "penetration [m]", "kinetic_energy [J
 class SweepOutcome:
     """A finished sweep.
 
-    points : by index, the row of each in the table: its values, and what was measured; None if it failed, and `note`
-        is the reason
+    points : the row of each in the table: values and what was measured; None if it failed, and `note` is the reason
     reused : number of points that were finished before; content_hash : hash of all results
     """
 
