@@ -7,6 +7,7 @@ x'' = −k x − b x' while the force pushes; contact ends when the force is zer
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -35,7 +36,7 @@ class Settings:
         return ", ".join([f"step {1e3 * self.step:g} ms", *texts])
 
 
-class Simulator:
+class Simulator(ABC):
     """An adapter of an engine. It imports the engine only in `version` and `run`."""
 
     title: str
@@ -61,13 +62,13 @@ class Simulator:
             purpose = f"The adapter of {self.package}"
             raise MissingDependencyError(self.package, purpose, installing("peers")) from error
 
+    @abstractmethod
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return the engine's best settings for the scene; if `step` [s] is given, the best ones at this step."""
-        raise NotImplementedError
 
+    @abstractmethod
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate the scene for a duration [s]."""
-        raise NotImplementedError
 
 
 def spring_restitution(damping_ratio: float) -> float:

@@ -584,3 +584,11 @@ def spin_of_landing(w: float, h: float, mu: float, e: float, speed: float) -> fl
 add("tall_box_lands_sliding",
     scene(0.02, [box("box", (0.04, 0.16), 0.2, (0, 0.0805, 0), (3, -1, 0))], [FLOOR], 0.5, 0.5, gravity=0.0),
     lambda motion: motion.angle()[-1], 0.019 * spin_of_landing(0.04, 0.16, 0.5, 0.5, 1.0), 0.3, "tips", tolerance=0.02)
+PAIR = [{"name": f"wall_{k}", "kind": "box", "center": [x, -0.05], "size": [1, 0.1]} for k, x in enumerate((-0.5, 0.5))]
+add("box_meets_a_seam_exactly", scene(0.2, [box("box", (0.08, 0.05), 0.2, (-0.1, 0.025, 0), (2, 0, 0))], PAIR),
+    moved(), 0.4, 0.4, "its front is on the seam at a step: the next wall's side is as near as its top")
+WIDE = [{"name": f"wall_{k}", "kind": "box", "center": [0.14 * k, -0.05], "size": [0.14, 0.1]} for k in (0, 1)]
+add("box_pushed_over_a_seam",
+    scene(0.9, [box("box", (0.08, 0.05), 0.2, (0.0047105, 0.025, 0), (0.03, 0, 0))], WIDE, 0.3,
+          hand={"body": "box", "force": [0.3 * 0.2 * G, 0, 0]}),
+    moved(), 0.027, 0.027, "the push equals the friction that tilts it")  # fmt: skip
