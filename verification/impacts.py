@@ -82,12 +82,6 @@ class ImpactCase:
         """Exact v⁺ for these doubles."""
         return exact_impact(*self.arrays, self.restitution).velocity
 
-    def with_restitution(self, e: float) -> ImpactCase:
-        """Return the case with another e; what was computed from M, J and v stays known."""
-        other, own = replace(self, restitution=e), ("restitution", "truth", "_answers")
-        other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in own})
-        return other
-
     def given_restitution(self) -> Any:
         """The restitution that a resolver gets: the scalar e, or a copy of the unequal ones."""
         return self.restitution if self.unequal is None else self.unequal.copy()

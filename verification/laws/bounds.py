@@ -130,7 +130,8 @@ class Bounds:
     Attributes
     ----------
     factor, power, ceiling : relative energy gain at most min(ceiling, factor · d · ε · κ(M)^power).
-    restitution : largest |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|).
+    restitution : largest |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|) where the rank of the rows is uncertain, and with unilateral
+        contacts; elsewhere the limit follows from M, J and v.
     bitwise_scaling : True if scaling rows by powers of two must change no bit.
     least : lower limit of the tolerances: the accuracy, relative to |u|, of a solver that iterates or uses J M⁻¹ Jᵀ.
     """
@@ -157,8 +158,11 @@ class Bounds:
         root, rank = np.sqrt(case.condition), len(case.row_space)
         smallest = case.smallest_motion / np.sqrt(1.0 + rank * (case.contacts - rank))
         rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / smallest))
-        noise = 4.0 * float(np.sqrt(max(case.contacts, 1)) * case.largest_noise / smallest)
-        return max(self.least, rounding + noise)
+        return max(self.least, rounding + self.noise(case) / smallest)
+
+    def noise(self, case: ImpactCase) -> float:
+        """Largest velocity, relative to |u|, that remains in rows that depend on others only up to rounding."""
+        return 4.0 * float(np.sqrt(max(case.contacts, 1)) * case.largest_noise)
 
 
 # Any correct resolver in plain numpy (Cholesky, then an SVD of unit rows) keeps these.

@@ -381,11 +381,13 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
             if time.monotonic() > ends:
                 return max(0, done - 1)
             own = mixed if name in UNEQUAL_LAWS else case
-            # every second law that compares calls takes an e of its own: an impact meets a band of e several times
-            if name in COMPARING and (done + k) % 2:
-                own = case.with_restitution(float(rng.uniform(trial.contract.least_restitution, 1.0)))
-                if "restitution" in trial.laws:
-                    trial.verdicts["restitution"].try_on(trial.laws["restitution"], own, watched, trial.bounds)
+            # every second law that compares calls takes an impact of its own: a band of e, μ or κ is met several times
+            if name in COMPARING and (done + k) % 2 and not large:
+                own = replace(trial.contract.draw(rng, _small(rng), trial.largest_condition),
+                              restitution=float(rng.uniform(trial.contract.least_restitution, 1.0)))
+                for single in OF_ONE_CALL:
+                    if single in trial.laws:
+                        trial.verdicts[single].try_on(trial.laws[single], own, watched, trial.bounds)
             trial.verdicts[name].try_on(trial.laws[name], own, watched, trial.bounds)
         for suspect, v_plus in watched.suspects:
             if suspect is not case and suspect is not mixed:  # judged by their own laws
@@ -394,6 +396,12 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
         if progress is not None and done > 0:
             progress(done, trial.impacts)
     return trial.impacts
+
+
+def _small(rng: np.random.Generator) -> int:
+    """Return the number of an impact that is not large."""
+    number = int(rng.integers(1 << 30))
+    return number + (number % LARGE_EVERY == LARGE_EVERY // 2)
 
 
 def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:
