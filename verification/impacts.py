@@ -21,6 +21,7 @@ Floats = NDArray[np.floating[Any]]
 # resolver may treat them as either, so laws that compare velocities skip such impacts.
 ROUNDING_BELOW, MOTION_ABOVE = 1e-13, 1e-5
 RANK_CUT = 1e-9  # anywhere in the gap
+INDEPENDENT = 1e-7  # ten times the motion that a resolver may leave in rows that it drops
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,11 @@ class ImpactCase:
         """Whether no singular value of the unit rows lies between rounding and motion, so that the rank is certain."""
         values = self._svd[0]
         return not np.any((values > ROUNDING_BELOW) & (values < MOTION_ABOVE))
+
+    @cached_property
+    def is_independent(self) -> bool:
+        """Whether each row differs from every combination of the others by more than any resolver may neglect."""
+        return self.contacts <= self.coordinates and bool(np.all(self._svd[0] > INDEPENDENT))
 
     @cached_property
     def row_space(self) -> Floats:
@@ -333,7 +339,7 @@ def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Float
     if kind == "light direction":
         return np.linalg.eigh(mass)[1][:, 0]
     if kind in ("grazing", "unseen") and len(rows):
-        right = np.linalg.svd(rows)[2]
+        right = np.linalg.svd(rows, full_matrices=len(rows) < d)[2]
         unseen = right[min(len(rows), d - 1) :]
         along = unseen.T @ (unseen @ v)
         return along + (1e-9 * v if kind == "grazing" else 0.0)

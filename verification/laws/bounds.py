@@ -130,8 +130,8 @@ class Bounds:
     Attributes
     ----------
     factor, power, ceiling : relative energy gain at most min(ceiling, factor · d · ε · κ(M)^power).
-    restitution : largest |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|) where the rank of the rows is uncertain, and with unilateral
-        contacts; elsewhere the limit follows from M, J and v.
+    restitution : largest |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|) of rows that a resolver may drop because others nearly determine
+        them, and of unilateral contacts; for independent rows the limit follows from M, J and v.
     bitwise_scaling : True if scaling rows by powers of two must change no bit.
     least : lower limit of the tolerances: the accuracy, relative to |u|, of a solver that iterates or uses J M⁻¹ Jᵀ.
     """
@@ -153,16 +153,14 @@ class Bounds:
         Whitening causes an error ε κ(M) (Cholesky's backward error); a direction of singular value σ has an error
         ε √κ(M) / σ. Rows that are dependent up to a noise below 1e-13 span directions that differ by noise / σ; the
         factor 1 + e = 2 doubles this. A resolver may use any r independent rows of c: of the best r rows, the smallest
-        σ is only known to be σ_min / √(1 + r (c − r)) or more (Gu and Eisenstat 1996, with f = 1).
+        σ is only known to be σ_min / √(1 + r (c − r)) or more (Gu and Eisenstat 1996, with f = 1). One that takes others
+        (say the fastest) has a smaller σ, which only its rank decision limits: the tolerance is `restitution` or more.
         """
         root, rank = np.sqrt(case.condition), len(case.row_space)
         smallest = case.smallest_motion / np.sqrt(1.0 + rank * (case.contacts - rank))
         rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / smallest))
-        return max(self.least, rounding + self.noise(case) / smallest)
-
-    def noise(self, case: ImpactCase) -> float:
-        """Largest velocity, relative to |u|, that remains in rows that depend on others only up to rounding."""
-        return 4.0 * float(np.sqrt(max(case.contacts, 1)) * case.largest_noise)
+        noise = 4.0 * float(np.sqrt(max(case.contacts, 1)) * case.largest_noise / smallest)
+        return max(self.least, self.restitution if rank < case.contacts else 0.0, rounding + noise)
 
 
 # Any correct resolver in plain numpy (Cholesky, then an SVD of unit rows) keeps these.

@@ -50,4 +50,4 @@ def test_rows_that_agree_to_noise_are_compared_up_to_that_noise() -> None:
     case = ImpactCase(np.eye(2), rows, np.array([-1.0, 1.0]), 1.0)
     assert case.is_separated and 0.0 < case.largest_noise < 1e-13
     residual = LAWS["redundancy"].check(case, resolve_impact, FACTORED)
-    assert residual is not None and residual.passed and residual.tolerance < 1e-12
+    assert residual is not None and residual.passed and residual.value < 1e-12
