@@ -153,8 +153,8 @@ class Bounds:
         Whitening causes an error ε κ(M) (Cholesky's backward error); a direction of singular value σ has an error
         ε √κ(M) / σ. Rows that are dependent up to a noise below 1e-13 span directions that differ by noise / σ; the
         factor 1 + e = 2 doubles this. A resolver may use any r independent rows of c: of the best r rows, the smallest
-        σ is only known to be σ_min / √(1 + r (c − r)) or more (Gu and Eisenstat 1996, with f = 1). One that takes others
-        (say the fastest) has a smaller σ, which only its rank decision limits: the tolerance is `restitution` or more.
+        σ is only known to be σ_min / √(1 + r (c − r)) or more (Gu and Eisenstat 1996, with f = 1). One that takes
+        others (say the fastest) has a smaller σ, limited by its rank decision: the tolerance is `restitution` or more.
         """
         root, rank = np.sqrt(case.condition), len(case.row_space)
         smallest = case.smallest_motion / np.sqrt(1.0 + rank * (case.contacts - rank))
