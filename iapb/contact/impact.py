@@ -248,7 +248,7 @@ def _resolve(arrays: Arrays, restitution: Floats, law: str, options: tuple[int |
                   _STATUS[int(status)], method, law, budget, along[0], share)
 
 
-@lru_cache(maxsize=64)  # laying out a block takes longer than resolving a small impact
+@lru_cache(maxsize=256)  # laying out a block takes longer than resolving a small impact
 def _scratch(coordinates: int, contacts: int, tangents: int) -> Any:
     """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while it runs."""
     rows = max(1, contacts)
