@@ -46,6 +46,8 @@ from verification.laws.equality import COMPARING, LAWS, elastic_conserves
 from verification.laws.resolver import Resolver, least_push, outcome, own_outcome
 
 TOUCHING = 1e-12  # relative to ‖Aᵢ‖ |u|: a smaller normal velocity counts as zero
+# Laws that call the resolver on variants of an impact.
+OF_VARIANTS = (*COMPARING, "no_impulse", "elastic", "separating", "sticking", "friction_opposes", "maximal_dissipation")
 CLEAR = 0.05  # least singular value of one contact's unit rows, for laws that need its impulse
 _REFINEMENTS, _STEPS, NEAR = 20, 5000, 1e-8  # searches of a cone by rays and by steps; the distance that ends them
 

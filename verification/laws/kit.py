@@ -25,9 +25,9 @@ from verification.impacts import (
     with_unequal_restitution,
 )
 from verification.laws.bounds import KIT, Bounds, Law, LawCount, LawResidual
-from verification.laws.contracts import CONTRACTS, EXACT_LAWS, Contract
+from verification.laws.contracts import CONTRACTS, EXACT_LAWS, OF_VARIANTS, Contract
 from verification.laws.counterexample import as_test, name_of, shrink
-from verification.laws.equality import COMPARING, OF_ONE_CALL, UNEQUAL_LAWS
+from verification.laws.equality import OF_ONE_CALL, UNEQUAL_LAWS
 from verification.laws.resolver import Resolver, ResolverFault, Watched, own_answer
 from verification.laws.strategies import search_counterexample
 
@@ -381,8 +381,8 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
             if time.monotonic() > ends:
                 return max(0, done - 1)
             own = mixed if name in UNEQUAL_LAWS else case
-            # every second law that compares calls takes an impact of its own: a band of e, μ or κ is met several times
-            if name in COMPARING and (done + k) % 2 and not large:
+            # every second law with variants takes an impact of its own: a band of e, μ or κ is met several times
+            if name in OF_VARIANTS and (done + k) % 2 and not large:
                 own = replace(trial.contract.draw(rng, _small(rng), trial.largest_condition),
                               restitution=float(rng.uniform(trial.contract.least_restitution, 1.0)))
                 for single in OF_ONE_CALL:
