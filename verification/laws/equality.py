@@ -46,8 +46,9 @@ def restitution_is_met(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
     """(15), dependent rows included: max |Jᵢv⁺ + e Jᵢv⁻| / ‖Aᵢ‖, relative to max |Jᵢv⁻| / ‖Aᵢ‖, or |u| if this is 0.
 
     The products Lᵀv⁻ and L⁻ᵀu⁺ are exact for an L that is wrong by d ε |L| (Higham 2002, theorem 8.5), which moves
-    Jᵢv⁺ / ‖Aᵢ‖ by d ε ‖|Lᵀ||v|‖ at most: |u| √κ(M) d ε in the worst case. A resolver may drop a row that others nearly
-    determine, and choose which of these rows it uses; the limit is then `bounds.restitution`, relative to |u|.
+    Jᵢv⁺ / ‖Aᵢ‖ by d ε ‖|Lᵀ||v|‖ at most: |u| √κ(M) d ε in the worst case. A solver that multiplies by an inverse adds
+    d ε / σ, for rows of smallest singular value σ. A resolver may drop a row that others nearly determine, and choose
+    which of these rows it uses; the limit is then `bounds.restitution`, relative to |u|.
     """
     v_plus = own_outcome(resolver, case)
     unmet = restitution_residual(case, v_plus)
@@ -55,8 +56,8 @@ def restitution_is_met(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
         return unmet, bounds.restitution
     seen = float(np.max(np.abs(case.unit_rows @ case.u))) / case.speed
     spread = sum(float(np.linalg.norm(np.abs(case.lower.T) @ np.abs(v))) for v in (case.velocity, v_plus)) / case.speed
-    rounding = 100.0 * case.coordinates * EPS * spread if case.is_independent else np.inf
-    limit = max(bounds.least, min(rounding, bounds.restitution))
+    rounding = 100.0 * case.coordinates * EPS * (spread + 1.0 / case.smallest_motion)
+    limit = max(bounds.least, min(rounding if case.is_independent else np.inf, bounds.restitution))
     scale = seen if seen > limit else 1.0
     return unmet / scale, limit / scale
 
