@@ -14,6 +14,7 @@ from reference.exact import bulk_energy_gain, relative_energy_gain
 from verification.impacts import Floats, ImpactCase
 
 EPS = float(np.finfo(float).eps)
+CEILING_UP_TO = 1e8  # κ(M) of the kit's own draws
 Measure = TypeVar("Measure", bound=Callable[..., Any])
 Found = tuple[float, float] | None  # value of a residual and its tolerance; None if the law does not apply
 
@@ -129,7 +130,8 @@ class Bounds:
 
     Attributes
     ----------
-    factor, power, ceiling : relative energy gain at most min(ceiling, factor · d · ε · κ(M)^power).
+    factor, power, ceiling : relative energy gain at most factor · d · ε · κ(M)^power, and at most `ceiling`, times
+        κ(M) / 1e8 above 1e8.
     restitution : largest |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|) of rows that a resolver may drop because others nearly determine
         them, and of unilateral contacts; for independent rows the limit follows from M, J and v.
     bitwise_scaling : True if scaling rows by powers of two must change no bit.
@@ -145,7 +147,8 @@ class Bounds:
 
     def energy_gain(self, case: ImpactCase) -> float:
         """Largest allowed relative gain (KE⁺ − KE⁻)/KE⁻, which rounding can cause."""
-        return max(self.least, min(self.ceiling, self.factor * case.coordinates * EPS * case.condition**self.power))
+        ceiling = self.ceiling * max(1.0, case.condition / CEILING_UP_TO)
+        return max(self.least, min(ceiling, self.factor * case.coordinates * EPS * case.condition**self.power))
 
     def comparison(self, case: ImpactCase) -> float:
         """Largest allowed distance, relative to |u|, between two velocities that are equal in exact arithmetic.

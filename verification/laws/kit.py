@@ -409,10 +409,8 @@ def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:
     own = replace(case, family=f"{case.family}, a variant of it that another law tried")
     own._answers[id(trial.resolver)] = trial.resolver, (v_plus, 0)
     name = "kinetic_energy" if case.unequal is None else "unequal_kinetic_energy"
-    within = case.condition <= trial.largest_condition
     if name in trial.laws:
-        trial.verdicts[name].try_on(trial.laws[name], own, trial.resolver,
-                                    trial.bounds if within else replace(trial.bounds, ceiling=np.inf))
+        trial.verdicts[name].try_on(trial.laws[name], own, trial.resolver, trial.bounds)
 
 
 def _drawn(trial: _Trial) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:

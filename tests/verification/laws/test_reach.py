@@ -64,13 +64,13 @@ def test_a_gain_on_large_impacts_is_shrunk_as_far_as_it_is_large() -> None:
 
 
 def test_an_impact_meets_a_band_of_restitution_several_times() -> None:
-    """A band of width 0.02 is 1 % of e: 24 impacts meet it about 24 · 3.8 · 1 % times, and each meeting is judged."""
+    """A band of width 0.02 is 1 % of e: 74 impacts, six draws each, meet it about four times, and each is judged."""
     met: set[Any] = set()
 
     def resolver(M: Floats, J: Floats, v: Floats, e: Any) -> Floats:
         met.add(e)
         return sound_resolver(M, J, v, e)
 
-    assert check_passivity(resolver, impacts=100, search=0).passed and len(met) > 300
+    assert check_passivity(resolver, impacts=100, search=0).passed and len(met) > 600
     banded = _where(lambda M, J, v, e: 0.3 <= e <= 0.32)
-    assert sum(not check_passivity(banded, impacts=50, seed=seed, search=0).passed for seed in range(6)) >= 3
+    assert sum(not check_passivity(banded, impacts=50, seed=seed, search=0).passed for seed in range(6)) >= 5
