@@ -161,13 +161,15 @@ def bulk_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLi
     if masses.shape not in ((d, d), (n, d, d)):
         raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
     for argument, array in (("mass_matrix", masses), ("v_minus", before), ("v_plus", after)):
-        size = np.abs(array[array != 0.0])
-        if not ((size >= _SMALLEST) & (size <= _LARGEST)).all():
+        size = np.abs(array)
+        if not size.max(initial=0.0) <= _LARGEST or array[size < _SMALLEST].any():
             expected = f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
             raise ArgumentError(argument, array, expected)
     gain, bound = np.empty(n), np.empty(n)
-    symmetric = np.broadcast_to((masses == np.swapaxes(masses, -1, -2)).all(axis=(-2, -1)), n)
-    _gains(np.ascontiguousarray(np.broadcast_to(masses, (n, d, d))), symmetric, before, after, gain, bound)
+    if masses.ndim == 2:
+        masses = masses[None] if n == 1 else np.broadcast_to(masses, (n, d, d))
+    symmetric = (masses == np.swapaxes(masses, -1, -2)).all(axis=(-2, -1))
+    _gains(np.ascontiguousarray(masses), symmetric, before, after, gain, bound)
     return gain, bound
 
 
