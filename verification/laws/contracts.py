@@ -111,8 +111,10 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
         used, p = directions, least_push(rays.reshape(-1, case.coordinates), target).reshape(directions.shape[:2])
         rest = target - np.einsum("ck,ckd->d", p, rays)
         distance = min(distance, float(np.linalg.norm(rest)))
-        if distance <= NEAR or m < 2:
+        if distance <= NEAR or m == 0:
             return distance
+        if m == 1:  # the rays are all; least squares end early where a large p along nearly opposed ones is needed
+            break
         more = np.stack([np.einsum("ck,ckm->cm", p, directions), tangents @ rest], axis=1)
         size = np.linalg.norm(more, axis=2, keepdims=True)
         more = np.divide(more, size, out=np.zeros_like(more), where=size > 0.0)
