@@ -584,6 +584,17 @@ def spin_of_landing(w: float, h: float, mu: float, e: float, speed: float) -> fl
 add("tall_box_lands_sliding",
     scene(0.02, [box("box", (0.04, 0.16), 0.2, (0, 0.0805, 0), (3, -1, 0))], [FLOOR], 0.5, 0.5, gravity=0.0),
     lambda motion: motion.angle()[-1], 0.019 * spin_of_landing(0.04, 0.16, 0.5, 0.5, 1.0), 0.3, "tips", tolerance=0.02)
+LEAN, FAST = 0.2, math.sqrt(4 + 4 / 3 * G * math.sin(0.2) * 0.02)  # speed after 0.02 m
+add("disc_rolls_into_wall",
+    scene(0.04, [disc("disc", 0.05, 1.0, (-0.05 * math.sin(LEAN), 0.05 * math.cos(LEAN), 0),
+                      (-2 * math.cos(LEAN), -2 * math.sin(LEAN), 40))],
+          [FLOOR | {"normal": [-math.sin(LEAN), math.cos(LEAN)]},
+           {"name": "wall", "kind": "half_plane", "normal": [1, 0],
+            "point": [-0.05 - 0.05 * math.sin(LEAN) - 0.02 * math.cos(LEAN), 0]}], 0.5, 0.6),
+    lambda motion: [motion.angle()[-1] - motion.angle()[20], (motion.place[-1, 0, 0] - motion.place[20, 0, 0]) / 0.02],
+    [0.02 * FAST / 0.05 * (1 - 2 / 3 * (1 + math.sin(LEAN))), 0.6 * FAST * math.cos(LEAN)],
+    0.02 * FAST / 0.05, "sticks to the wall and climbs it: Δω = 2/3 (v + v sin 0.2) / r; the slope lets go",
+    0.02)  # fmt: skip
 PAIR = [{"name": f"wall_{k}", "kind": "box", "center": [x, -0.05], "size": [1, 0.1]} for k, x in enumerate((-0.5, 0.5))]
 add("box_meets_a_seam_exactly", scene(0.2, [box("box", (0.08, 0.05), 0.2, (-0.1, 0.025, 0), (2, 0, 0))], PAIR),
     moved(), 0.4, 0.4, "its front is on the seam at a step: the next wall's side is as near as its top")

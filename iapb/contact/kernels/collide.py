@@ -16,7 +16,7 @@ from iapb.contact.kernels.contact_set import (
     pair_restitution,
 )
 from iapb.contact.kernels.impact import factored_impact, rank_tolerance, whiten_impact
-from iapb.contact.kernels.impact_friction import add_impact_friction
+from iapb.contact.kernels.impact_friction import add_impact_friction, sweep_impact
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.passive import passive_step, write_step
 from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
@@ -128,6 +128,14 @@ def resolve_unequal(world, state, size, count, smallest, tolerance):
 @kernel(needs="impact_friction", otherwise=(1.0, 1.0, True))
 def add_friction_to_impact(world, state, size, count, rank, only_push):
     """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
+    gather_tangents(world, state, size, count)
+    return add_impact_friction(size, count, rank, state.work, state.push_work, state.friction_work, only_push,
+                               state.row_impulse)
+
+
+@kernel(needs="impact_friction", otherwise=None)
+def gather_tangents(world, state, size, count):
+    """Write μ of each contact and the tangents' rows of J."""
     contacts, f = state.contacts, state.friction_work
     tangents = f.velocity.shape[0]
     for r in range(count):
@@ -138,7 +146,6 @@ def add_friction_to_impact(world, state, size, count, rank, only_push):
             direction_row(world.mechanism, state.body, contacts, i, tangent, state.row)
             for k in range(size):
                 f.rows[r * tangents + a, k] = state.row[state.dofs[k]]
-    return add_impact_friction(size, count, rank, state.work, state.push_work, f, only_push, state.row_impulse)
 
 
 @kernel
@@ -148,21 +155,27 @@ def swap_rows(state, size, i, j):
     for k in range(size):
         work.rows[k, i], work.rows[k, j] = work.rows[k, j], work.rows[k, i]
     work.length[i], work.length[j] = work.length[j], work.length[i]
-    for each in (state.row_restitution, state.row_impulse):
+    for each in (state.row_restitution, state.row_impulse, state.friction_work.least):
         each[i], each[j] = each[j], each[i]
     state.rows[i], state.rows[j] = state.rows[j], state.rows[i]
 
 
 @kernel
 def keep_together(state, size, count):
-    """Put the rows first that push, or that meet −e γ⁻ after Poisson's law; return how many. The others open."""
-    work, kept = state.work, 0
-    least = OPENS * math.sqrt(dot_of(work.u[:size], work.u[:size]))
+    """Put the rows first that push, or that meet −e γ⁻ after Poisson's law; return how many. The others open.
+
+    Writes the least velocity of each along unit rows: −e γ⁻ or zero where it opens, else that after Poisson's law.
+    """
+    work, least, kept = state.work, state.friction_work.least, 0
+    opens = OPENS * math.sqrt(dot_of(work.u[:size], work.u[:size]))
     for r in range(count):
-        open_by = 0.0
+        before = after = 0.0
         for k in range(size):
-            open_by += work.rows[k, r] * (work.change[k] + (1.0 + state.row_restitution[r]) * work.u[k])
-        if state.row_impulse[r] > 0.0 or open_by <= least:
+            before += work.rows[k, r] * work.u[k]
+            after += work.rows[k, r] * (work.u[k] + work.change[k])
+        due = -state.row_restitution[r] * before
+        least[r] = min(after, max(due, 0.0))
+        if state.row_impulse[r] > 0.0 or after - due <= opens:
             swap_rows(state, size, kept, r)
             kept += 1
     for k in range(size):
@@ -175,27 +188,22 @@ def keep_together(state, size, count):
 def push_with_friction(world, state, size, count, smallest, tolerance):
     """Resolve contacts that only push, with friction; return (rank, clamp, share of friction, solved).
 
-    Friction acts where contacts stay together. Where it would make a contact pull, this contact opens: the impact is
-    resolved again without its row, as a tall box that lands flat and slides tips over its leading edge.
+    Friction acts where contacts stay together. Where it would make one of them pull, sweeps over all contacts decide
+    which open: a tall box that lands flat and slides tips over its leading edge, a disc climbs the wall it rolls into.
     """
     work, f, together = state.work, state.friction_work, count
-    while True:
-        rank, clamp, solved = resolve_unequal(world, state, size, together, smallest, tolerance)
-        if solved:
-            together = keep_together(state, size, together)
-            rank = orthonormal_basis(size, together, tolerance, size, work)
-        share, factor, met = add_friction_to_impact(world, state, size, together, rank, solved)
-        pulls, most = -1, 0.0
-        for r in range(together):
-            most = max(most, f.wanted[r])
-        for r in range(together if solved and not met and together > 1 else 0):
-            if f.wanted[r] < -OPENS * most and (pulls < 0 or f.wanted[r] < f.wanted[pulls]):
-                pulls = r
-        if pulls < 0:
-            break
-        together -= 1
-        swap_rows(state, size, pulls, together)
+    rank, clamp, solved = resolve_unequal(world, state, size, count, smallest, tolerance)
+    if solved:
+        together = keep_together(state, size, count)
+        rank = orthonormal_basis(size, together, tolerance, size, work)
+    share, factor, met = add_friction_to_impact(world, state, size, together, rank, solved)
     state.row_impulse[together:count] = 0.0
+    if solved and not met:
+        f.p[together * f.velocity.shape[0] : count * f.velocity.shape[0]] = 0.0
+        gather_tangents(world, state, size, count)
+        swept, met = sweep_impact(size, count, work, f, state.row_impulse)
+        if met:
+            factor, share = swept, 1.0
     return rank, clamp * factor, share, solved and met
 
 

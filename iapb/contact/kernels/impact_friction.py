@@ -48,6 +48,7 @@ class FrictionWork(NamedTuple):
     sliding: Annotated[Floats, "row"]  # μ; 0 where the frictionless normal impulse pulls
     without: Annotated[Floats, "row"]  # normal impulses without friction [N s]
     wanted: Annotated[Floats, "row"]  # normal impulses with friction
+    least: Annotated[Floats, "row"]  # of contacts that only push: smallest velocity after, along unit rows of A
     target: Annotated[Floats, "velocity"]  # Q Δ_n
     left: Annotated[Floats, "velocity"]
     moved: Annotated[Floats, "velocity"]  # Bᵀ p_t
@@ -67,8 +68,8 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     lower, largest = work.lower, 0.0
     for j in range(p.shape[0]):  # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
         row, slip = f.rows[j, :d], 0.0
-        for k in range(d):  # L x = row
-            row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
+        whiten_row(lower, row)
+        for k in range(d):
             slip += row[k] * (u[k] + change[k])
         f.speed[j], before = slip, dot_of(row, row)
         largest = max(largest, before)
@@ -90,6 +91,13 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     for j in range(p.shape[0]):
         p[j] *= clamp * share
     return share, clamp, met
+
+
+@kernel
+def whiten_row(lower, row):
+    """Solve L x = row in place."""
+    for k in range(row.shape[0]):
+        row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
 
 
 @kernel
@@ -140,6 +148,11 @@ MET = 1e-10
 # Sweeps of p_t in a round, as the limits change anyway: until one changes velocities by a tenth of the first.
 SWEEPS, SETTLED = 10, 0.1
 HELD_SWEEPS = 200  # with the limits held for good
+# Sweeps over normal impulses and friction. Nearly parallel contacts share their load anew for thousands of sweeps, long
+# after the velocities are right. Of 54 impacts that the rounds failed to settle, 200 sweeps end 52 within a thousandth
+# of |u| of what 20,000 give, and the others within 4e-3.
+IMPACT_SWEEPS = 200
+SWEPT = 3e-3  # share of |u|: the sweeps have settled if the last one changed velocities by less
 PUSHES = 1e-9  # share of the normal impulse that non-negative impulses may miss: rounding of the active set
 # Of the largest normal impulse: friction may exceed a limit by this, the rounding of impulses that cancel.
 CONE_ROUNDING = 1e-12
@@ -176,6 +189,53 @@ def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
     friction_sweeps(count, f, HELD_SWEEPS, STILL * scale, True)
     _move_normals(count, rank, work, f, only_push)
     return False
+
+
+@kernel
+def sweep_impact(d, count, work, f, impulses):
+    """Sweep over contacts that only push, velocity ≥ `f.least`, with friction; return (clamp, whether this settled).
+
+    A sweep sets each normal impulse, then the friction within its limit. Where the sweeps settle without a gain of
+    energy, the result is written as by `add_impact_friction`; else all but scratch stays as it is.
+    impulses : (≥count,) of the result so far, from which the sweeps start, as they do from `f.p`.
+    """
+    size, u, moved, p_n = f.velocity.shape[0], work.u[:d], f.moved[:d], f.wanted
+    for j in range(count * size):
+        whiten_row(work.lower, f.rows[j, :d])
+        f.speed[j] = dot_of(f.rows[j, :d], u)
+    for i in range(count):
+        f.size[i, 0] = d
+        set_inertia(f, i, d)
+        p_n[i] = impulses[i] * work.length[i]
+    speed, fastest = math.sqrt(dot_of(u, u)), math.inf
+    for _ in range(IMPACT_SWEEPS):
+        combine(count, f)
+        for k in range(d):
+            for i in range(count):
+                moved[k] += work.rows[k, i] * p_n[i]
+        fastest = 0.0
+        for i in range(count):
+            closing = -f.least[i]
+            for k in range(d):
+                closing += work.rows[k, i] * (u[k] + moved[k])
+            change = max(-p_n[i], -closing)
+            p_n[i] += change
+            for k in range(d):
+                moved[k] += work.rows[k, i] * change
+            f.limit[i] = f.coefficient[i] * p_n[i] / work.length[i] if work.length[i] > 0.0 else 0.0
+            fastest = max(fastest, abs(change))
+            if f.inertia[i] > 0.0:
+                fastest = max(fastest, _slide(f, i) / math.sqrt(f.inertia[i]))
+        if fastest <= MET * speed:
+            break
+    if fastest > SWEPT * speed or dot_of(u, moved) + 0.5 * dot_of(moved, moved) > 0.0:
+        return 1.0, False
+    copy_into(work.change[:d], moved)
+    from_whitened(work.lower, work.change[:d], work.v_change)
+    clamp = apply_change(d, True, work)
+    for i in range(count):
+        impulses[i] = clamp * p_n[i] / work.length[i] if work.length[i] > 0.0 else 0.0
+    return clamp, True
 
 
 @kernel
