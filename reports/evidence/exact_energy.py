@@ -45,11 +45,23 @@ def _rows(folder: Path, name: str) -> list[Row]:
 
 
 def _certify_beside(study: Study, names: Sequence[str]) -> None:
-    """Certify many runs in processes; what raises there is tried again, and named, by `_certified`."""
     if len(names) > FEW:
-        rows = partial(attempted, partial(_rows, study.run.store.folder))  # type: ignore[attr-defined]
-        found = processes(cores())(rows, names)
-        study.results.update((name, given) for name, given in found if given is not None)
+        _beside(study, partial(_rows, study.run.store.folder), names)  # type: ignore[attr-defined]
+
+
+def _draw_beside(study: Study, families: Sequence[str]) -> None:
+    if cores() > 1:
+        _beside(study, partial(_drawn, study.depth), families)
+
+
+def _beside(study: Study, compute: Callable[[Any], Any], cases: Sequence[str]) -> None:
+    """Compute the rows of cases in processes; a case that raises there is tried again, and named, without them."""
+    found = processes(cores())(partial(attempted, compute), cases)
+    study.results.update((case, given) for case, given in found if given is not None)
+
+
+def _drawn(depth: str, family: str) -> Row:
+    return exact_energy(family, _DRAWN[depth])
 
 
 def attempted(compute: Callable[[Any], Any], part: Any) -> Any:
@@ -104,8 +116,8 @@ TOPIC = Topic(
     checks=(
         Check(key="certified runs", question="", cases=_runs, prepare=_certify_beside, row=_certified,
               says=_recorded_says),
-        Check(key="adverse impacts", question="", cases=lambda study: ADVERSE_FAMILIES,
-              row=lambda study, family: exact_energy(family, _DRAWN[study.depth]), says=_drawn_says,
+        Check(key="adverse impacts", question="", cases=lambda study: ADVERSE_FAMILIES, prepare=_draw_beside,
+              row=lambda study, family: study.once(family, lambda: _drawn(study.depth, family)), says=_drawn_says,
               rule=verdict_of_families, note=_NOTE),
     ),
     says=_answer,

@@ -25,6 +25,8 @@ from reports.store.io import opened
 from reports.store.keys import evidence_version
 from reports.uses import UsedRun
 from verification import haptic_rate
+from verification.check import Study
+from verification.claims import peg
 from verification.cost import effects
 from verification.finding import Failure, Finding, attempt
 from verification.hard_cases.study import on_hard_cases
@@ -45,7 +47,8 @@ SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link
 FIGURE_RUNS = "runs of the figures"
 CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
 # The first stages to be computed: the figures' runs compile the engine, proofs need no engine, claims take longest.
-FIRST = ("Coq development", "proofs", "claims on the peg", "claims")
+ON_THE_PEG = "claims on the peg"
+FIRST = ("Coq development", "proofs", ON_THE_PEG, "claims")
 PAUSE = 0.2  # [s] between two looks at what the workers say
 
 
@@ -120,6 +123,7 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
         return
     with suppress(IapbError), batches.worker_pool(batches.cores()) as pool:
         running = {pool.submit(_figure_runs, out)} | {pool.submit(_filled, stages[name], out, depth) for name in ahead}
+        running |= {pool.submit(_slowest_runs, out, depth)} if ON_THE_PEG in ahead else set()
         while running:
             done, running = wait(running, PAUSE, FIRST_COMPLETED)
             stages |= {stage.name: stage for future in done if isinstance(stage := future.result(), Stage)}
@@ -131,6 +135,15 @@ def _figure_runs(out: Path) -> Stage | None:
     """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those that fail."""
     runs.figure_runs(Runner(out / "runs"), partial(_tell, FIGURE_RUNS), [])
     return None
+
+
+def _slowest_runs(out: Path, depth: str) -> None:
+    """Simulate runs of the claims on the peg, in a worker without work, until one exists: the last first."""
+    runner = Runner(out / "runs")
+    for scene, world in peg.slowest_runs(Study(runner, depth)):
+        if (out / "runs" / runner.file_of(scene, world)).is_file():
+            return
+        attempt("", partial(runner, scene, world, keep=False), [])  # the claim that needs it will name the failure
 
 
 def _filled(stage: Stage, out: Path, depth: str) -> Stage | None:

@@ -132,6 +132,13 @@ def _all_starts(study: Study) -> tuple[Condition, ...]:
     return tuple(dict.fromkeys((*start_conditions(study.depth), *FULL_GRID)))
 
 
+def slowest_runs(study: Study) -> Iterator[tuple[Scene, str]]:
+    """Yield scene and world of the runs of C10 that take longest, the last first, for a process beside the claims."""
+    for start in dict.fromkeys(start.seen_by("ideal", "full") for start in reversed(_all_starts(study))):
+        for world in ("ideal", "CBuc"):
+            yield place(study, start), world
+
+
 def _trajectory(study: Study, condition: Condition) -> Iterator[Row]:
     """Yield one row per coordinate and one for all three together; the part is the coordinate, and LARGER if so."""
     larger = f", {LARGER}" if condition.approach_velocity > PAPERS else ""
