@@ -45,7 +45,7 @@ COMMANDS: dict[str, Sequence[str]] = {
     "run": ("run", "peg_corner", "--set", "duration=60", "--resume", "--out", OWN),
     "live": ("live", "peg_corner", "--seconds", "0.7", "--out", OWN),
     "sweep": ("sweep", "study.yaml", "--workers", "1", "--out", OWN),
-    "reproduce": ("reproduce", "--figure", "fig02", "--out", OWN),
+    "reproduce": ("reproduce", "--figure", "fig07", "--out", OWN),
     "verify": ("verify", "--full", "--impacts", "20", "--trajectories", "1", "--workers", "1", "--out", OWN),
     "store gc": ("store", "gc", OWN, "--delete"),
 }
