@@ -217,6 +217,8 @@ def _matrix(budget: Budget, group: Any, most: int) -> Any:
     if nz in (_ROWS, _COLUMNS):
         compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)((x, i, p), shape=(m, n))
         compressed.check_format(full_check=True)  # an index out of range would write outside the array
+        if np.any(compressed.indptr[1:] < compressed.indptr[:-1]):  # not seen by it where the last pointer is 0
+            raise ValueError(f"{group.name}: the pointers p decrease")
         return compressed.tocsc()
     if not 0 <= nz <= len(x):
         raise ValueError(f"{group.name} with nz = {nz}: expected -1, -2 or the number of its entries")

@@ -128,6 +128,7 @@ def test_a_global_problem_is_condensed_whatever_its_number_of_coordinates(tmp_pa
 
 
 @pytest.mark.parametrize(("name", "value", "says"), [
+    ("fclib_local/W/p", np.array([0, *[10**9] * 5, 0], np.int32), "pointers p decrease"),
     ("fclib_local/W/i", np.array([99, 0], np.int32), "indices"), ("fclib_local/vectors/mu", None, "cannot be read"),
     ("fclib_local/W/nz", np.array([77]), "nz = 77"), ("fclib_local/spacedim", np.array([5]), "2 or 3"),
     ("fclib_local/W/m", np.array([10**6]), "at most"), ("fclib_local/vectors/q", np.array([np.nan]), "finite numbers"),
