@@ -169,6 +169,7 @@ class Block:
         self._members = {name: block(value) if isinstance(value, dict) or hasattr(value, "_fields") else value
                          for name, value in given.items()}
         self._content = SimpleNamespace(**self._members) if given is content else content._replace(**self._members)
+        vars(self).update(self._members)  # found without a call of __getattr__
         self.block_type = _type_of(type(content).__name__, *((k, _kind(value)) for k, value in self._members.items()))
         self._memory = np.array([word for value in self._members.values() for word in _layout(value)], np.int64)
         self.address = self._memory.ctypes.data

@@ -378,21 +378,22 @@ def extend(dataset: Any, values: Any) -> None:
         dataset[first:] = np.asarray(values)
 
 
-def write_scale(group: Any, dimension: str, values: Any, unit: str, *, growing: bool = False) -> None:
-    """Write the values along a dimension, and make them its scale."""
+def write_scale(group: Any, dimension: str, values: Any, unit: str, *, growing: bool = False) -> Any:
+    """Write the values along a dimension, make them its scale, and return it."""
     scale = write_values(group, dimension, values, growing=growing)
     scale.attrs["units"] = unit
     scale.make_scale(dimension)
+    return scale
 
 
 def write_quantity(
-    group: Any, name: str, values: Any, dimensions: Sequence[str], unit: str, meaning: str, *, growing: bool = False
+    group: Any, name: str, values: Any, scales: Sequence[Any], unit: str, meaning: str, *, growing: bool = False
 ) -> Any:
-    """Write one quantity; `group` must already have the scales of its dimensions."""
+    """Write one quantity along dimensions with these scales."""
     dataset = write_values(group, name, values, growing=growing)
     dataset.attrs.update({"units": unit, "long_name": meaning})
-    for axis, dimension in enumerate(dimensions):
-        dataset.dims[axis].attach_scale(group[dimension])
+    for axis, scale in enumerate(scales):
+        dataset.dims[axis].attach_scale(scale)
     return dataset
 
 

@@ -125,27 +125,30 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
         write_text(file.require_group(group), name, value)
     names = file.create_group("mechanism")
     for dimension in ("coordinate", "velocity", "body"):
-        write_scale(names, dimension, getattr(run, f"{dimension}_names"), "1")
-    for dimension in ("coordinate", "velocity"):
-        units = getattr(run, f"{dimension}_units")
-        write_quantity(names, f"{dimension}_unit", units, (dimension,), "1", f"unit of each {dimension}")
+        scale = write_scale(names, dimension, getattr(run, f"{dimension}_names"), "1")
+        if dimension != "body":
+            units = getattr(run, f"{dimension}_units")
+            write_quantity(names, f"{dimension}_unit", units, [scale], "1", f"unit of each {dimension}")
     for name in (*GROUPS, "energy", "effects", "provenance"):
         file.create_group(name, track_order=name in ("energy", "provenance"))
+    groups, scales = {name: file[name] for name in file}, dict[tuple[str, str], Any]()  # a look-up takes 0.1 ms
     for group, quantity, values in _columns(run):
         for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
-            if dimension not in file[group]:
-                write_scale(file[group], dimension, *coordinates_of(run, dimension, length), growing=growing)
-        dataset = write_quantity(file[group], quantity.name, values, quantity.dimensions, unit_of(quantity, run),
-                                 quantity.meaning, growing=growing)  # fmt: skip
+            if (group, dimension) not in scales:
+                scales[group, dimension] = write_scale(
+                    groups[group], dimension, *coordinates_of(run, dimension, length), growing=growing)
+        dataset = write_quantity(groups[group], quantity.name, values, [scales[group, name] for name in
+                                 quantity.dimensions], unit_of(quantity, run), quantity.meaning,
+                                 growing=growing)  # fmt: skip
         if quantity.name == "state":
             dataset.attrs.update(STATE_ATTRIBUTES)
     effects = file["effects"]
-    write_scale(effects, "effect", tuple(effect.name for effect in run.effects), "1")
+    scale = write_scale(effects, "effect", tuple(effect.name for effect in run.effects), "1")
     active = np.array([effect.active for effect in run.effects], np.int8)
-    write_quantity(effects, "active", active, ("effect",), "1", "1 where the effect was on")
+    write_quantity(effects, "active", active, [scale], "1", "1 where the effect was on")
     for name, meaning in (("reason", "why"), ("ignores", "field of the scene that the law ignored, or empty")):
         texts = tuple(getattr(effect, name) for effect in run.effects)
-        write_quantity(effects, name, texts, ("effect",), "1", meaning)
+        write_quantity(effects, name, texts, [scale], "1", meaning)
     for name, text in (collect_provenance() if provenance is None else provenance).items():
         write_text(file["provenance"], name, text)
 

@@ -74,7 +74,7 @@ def append_columns(group: Any, columns: Iterable[tuple[str, str, str, Any]]) -> 
             write_scale(group, name, values, unit, growing=True)
             group[name].attrs["long_name"] = meaning
         else:
-            write_quantity(group, name, values, (next(iter(group)),), unit, meaning, growing=True)
+            write_quantity(group, name, values, [group[next(iter(group))]], unit, meaning, growing=True)
 
 
 def read_columns(path: Path | str, name: str | None = None) -> dict[str, tuple[str, Any]]:
