@@ -19,6 +19,7 @@ from reports.show import Answer, Json, one_line, said, stage_progress
 from reports.store.care import (
     DAMAGED,
     FOREIGN,
+    OTHER,
     WHOLE,
     FileState,
     check_store,
@@ -85,7 +86,7 @@ def _checked(where: Path, repair: bool) -> Answer:
         return Answer(facts | {"logs": logs, "aside": aside}, lines)
     if count[DAMAGED]:
         lines.append(f"iapb store repair {where} sets aside damaged files whose seal holds; remove the others.")
-    return Answer(facts, lines, int(bool(count[DAMAGED] or where.is_file() and count[FOREIGN])))
+    return Answer(facts, lines, int(bool(count[DAMAGED] or where.is_file() and count[FOREIGN] + count[OTHER])))
 
 
 def _recovered(parts: Path) -> Iterator[str]:

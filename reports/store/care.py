@@ -20,13 +20,14 @@ from reports.store.io import WRITING, is_ours, looks_ours, opened
 from reports.store.keys import SOURCES, evidence_version, is_older_engine
 from reports.store.parts import at_work, is_parts, read_head, remove_parts
 from reports.store.runs import opened_run, read_provenance
-from reports.store.schema import FORMAT, TABLE_FORMAT
+from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
 
 Progress = Callable[[int, int], None]
 
 DAMAGED_SUFFIX = ".damaged"
 _LOOKED_AT = (".h5", PARTIAL_SUFFIX, WRITING, DAMAGED_SUFFIX)
 WHOLE, DAMAGED, PARTIAL, FOREIGN, STALE, LEFTOVER = "whole", "damaged", "partial", "foreign", "stale", "leftover"
+OTHER = "other version"
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,8 @@ def _files(folder: Path) -> Iterator[Path]:
 
 def _state(path: Path) -> FileState:
     if io.is_aside(path):
-        return FileState(path, LEFTOVER, "not whole yet: a writer is at work, or was stopped before it was done")
+        return FileState(path, LEFTOVER, "a process is writing it" if io.is_locked(path) else
+                         "half written, and nobody writes it; without a seal it stays until you remove it")
     if is_parts(path):
         why = "a process is at work on it" if at_work(path) else "iapb run --resume goes on, repair makes it readable"
         return FileState(path, LEFTOVER, f"a run in the making: {why}")
@@ -79,7 +81,9 @@ def _state(path: Path) -> FileState:
     if path.name.endswith(DAMAGED_SUFFIX):
         return FileState(path, LEFTOVER, "set aside as damaged")
     try:
-        kind, _ = _kind_and_code(path)
+        kind, _, version = _head(path)
+        if kind in (FORMAT, TABLE_FORMAT) and version != FORMAT_VERSION:
+            return FileState(path, OTHER, f"its format has version {version}, and this iapb reads {FORMAT_VERSION}")
         if kind == FORMAT:
             with opened_run(path) as (run, _):
                 if path.name.endswith(PARTIAL_SUFFIX) or not run.complete:
@@ -94,14 +98,16 @@ def _state(path: Path) -> FileState:
 def is_run(path: Path) -> bool:
     """Return whether a file is a run or a damaged file of iapb; tables and foreign files are not."""
     try:
-        return _kind_and_code(path)[0] == FORMAT
+        return _head(path)[0] == FORMAT
     except RunFileError:
         return looks_ours(path)
 
 
-def _kind_and_code(path: Path) -> tuple[str, str]:
+def _head(path: Path) -> tuple[str, str, int]:
+    """Return format, code and format version of a file."""
     with opened(path, expected_format=None) as file:
-        return str(file.attrs.get("format", "")), str(file.attrs.get("code", ""))
+        found = file.attrs
+        return str(found.get("format", "")), str(found.get("code", "")), int(found.get("format_version", 0))
 
 
 def stores_below(folder: Path | str) -> tuple[Path, ...]:
@@ -189,9 +195,11 @@ def _useless(parts: Path) -> str:
 
 
 def _stale(path: Path) -> str:
-    """Return "run" or "table" if an older version of iapb made the file; "" for all other files and damaged ones."""
+    """Return "run" or "table" if other code of iapb made a file; "" for all other files and those of later formats."""
     with suppress(RunFileError):
-        kind, code = _kind_and_code(path)
+        kind, code, version = _head(path)
+        if version > FORMAT_VERSION:
+            return ""
         if kind == FORMAT:
             return "run" if is_older_engine(code) else ""
         return "table" if read_provenance(path).get(SOURCES, evidence_version()) != evidence_version() else ""

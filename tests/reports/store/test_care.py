@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import shutil
@@ -40,7 +41,7 @@ from reports.store.io import MARK_NAME, sealed
 from reports.store.keys import SOURCES
 from reports.store.parts import Parts
 from reports.store.runs import store_run
-from reports.store.schema import GROUPS, RESULT_GROUPS
+from reports.store.schema import FORMAT_VERSION, GROUPS, RESULT_GROUPS
 from reports.store.tables import write_record
 from verification.table import titled
 
@@ -112,6 +113,32 @@ def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again(
     assert main(["store", "gc", str(filled), "--delete"]) == 0 and not aside.exists()
     assert main(["store", "check", str(filled / "nowhere")]) == 1
     assert main(["store", "again", str(spoilt)]) == 0 and "the same to the last bit" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("version", [FORMAT_VERSION - 1, FORMAT_VERSION + 1])
+def test_what_another_version_wrote_and_what_a_killed_writer_left_are_told_and_stay(
+    filled: Path, version: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = write_table(filled / "runs" / "table.h5", "t", titled(("x",), [(1.0,)]))
+    others = [runs(filled)[0], table]
+    for path in others:
+        with h5py.File(path, "r+") as file:
+            file.attrs["format_version"] = version
+        path.write_bytes(sealed(path.read_bytes()))
+    half = runs(filled)[0].with_name(".x.h5.1.writing")
+    half.write_bytes(runs(filled)[1].read_bytes()[:999])
+    aged(half)
+    for action in (["check"], ["repair"], ["gc", "--delete"]):
+        assert main(["store", *action, str(filled)]) == 0
+    said = capsys.readouterr().out
+    for path in others if version > FORMAT_VERSION else ():
+        assert path.exists() and f"{path}: other version: its format has version {version}, and this iapb reads" in said
+    assert f"{half}: leftover: half written, and nobody writes it; without a seal" in said and half.exists()
+    with half.open("rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert main(["store", "check", str(filled)]) == 0
+    assert f"{half}: leftover: a process is writing it" in capsys.readouterr().out
+    assert main(["store", "check", str(others[0])]) == 1
 
 
 def test_garbage_is_what_no_present_code_asks_for(filled: Path) -> None:
