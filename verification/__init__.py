@@ -12,7 +12,6 @@ from iapb.lazy import lazy_names
 if TYPE_CHECKING:
     from verification.cost.impacts import which_method as which_method
     from verification.cost.impacts import work_precision as work_precision
-    from verification.hard_cases import judge_hard_cases as judge_hard_cases
     from verification.laws import bulk_impacts as bulk_impacts
     from verification.laws import check_passivity as check_passivity
     from verification.worlds import compare_worlds as compare_worlds
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 _HOME = {
     "check_passivity": "verification.laws",
     "bulk_impacts": "verification.laws",
-    "judge_hard_cases": "verification.hard_cases",
     "which_method": "verification.cost.impacts",
     "work_precision": "verification.cost.impacts",
     "compare_worlds": "verification.worlds",

@@ -140,7 +140,6 @@ def sampler(call: Call) -> Callable[[], float]:
 def take_turns(
     contestants: Mapping[Key, Callable[[], float]], rounds: int, *, warm: bool = True, enough: float = np.inf,
     failures: list[Failure] | None = None, name: Callable[[Key], str] = str,
-    progress: Callable[[int, int], None] | None = None,
 ) -> dict[Key, Times]:
     """Sample every contestant once per round, in a new random order each round.
 
@@ -152,7 +151,6 @@ def take_turns(
     enough : a contestant stops after LEAST_ROUNDS rounds once its samples add up to more than this [s]
     failures : receives a Failure for each contestant that raises; the result leaves these contestants out
     name : returns the name of a contestant for its Failure
-    progress : called with (rounds done, rounds)
     """
     found: dict[Key, list[float]] = {key: [] for key in contestants}
     order = np.random.default_rng(0)
@@ -168,6 +166,4 @@ def take_turns(
                     del found[key]
                 elif turn >= warm:
                     taken.append(spent)
-            if progress is not None:
-                progress(turn + (not warm), rounds)
     return {key: Times(tuple(samples)) for key, samples in found.items()}

@@ -255,15 +255,15 @@ def _where_it_fails(trials: Table) -> str:
     return f"in {len(failed.rows)} of {decided} trials, with {ranges(failed).replace('; ', ', ')}"
 
 
-def verdict_of(parts: Iterable[Part], failures: Sequence[Failure] = ()) -> str:
-    """Return the verdict of a finding: that of its worst part. A failed case never counts as holding.
+def verdict_of(parts: Iterable[Part]) -> str:
+    """Return the verdict of a finding: that of its worst part.
 
     A part with a role never counts. An optional part without any decided trial counts only if there is no other part.
     """
     given = [part for part in parts if not part.role]
     absent = [part.optional and part.verdict == NOT_TESTABLE and not part.decided for part in given]
     counted = [part for part, left_out in zip(given, absent, strict=True) if not left_out] or given
-    return worst([part.verdict for part in counted] + [NOT_COMPUTED] * bool(failures))
+    return worst(part.verdict for part in counted)
 
 
 def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:

@@ -6,4 +6,3 @@ from verification.hard_cases.case import HardCaseVerdict as HardCaseVerdict
 from verification.hard_cases.case import TrajectoryCase as TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES as HARD_CASES
 from verification.hard_cases.judge import judge_hard_case as judge_hard_case
-from verification.hard_cases.judge import judge_hard_cases as judge_hard_cases

@@ -17,8 +17,8 @@ from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from reference.exact import condition_number, exact_impact, row_condition_number
 from verification.hard_cases.exact import FrictionalImpact, exact_poisson
+from verification.impacts import Floats
 
-Floats = NDArray[np.floating[Any]]
 Exact = NDArray[np.object_] | Floats
 EPS = float(np.finfo(float).eps)
 

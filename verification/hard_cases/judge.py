@@ -17,8 +17,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache, partial
@@ -27,8 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb import resolve_frictional_impact, resolve_impact
-from iapb.errors import ArgumentError, IapbError, RangeError
-from iapb.names import one_of
+from iapb.errors import IapbError, RangeError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
@@ -36,7 +34,6 @@ from reference.exact import rational_matrix, relative_energy_gain
 from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
 from reference.worlds import require_complete, run_world
-from verification.finding import Failure, of_each
 from verification.hard_cases.case import (
     COULOMB,
     DEPENDS_ON_ROUNDING,
@@ -45,7 +42,6 @@ from verification.hard_cases.case import (
     RESTITUTION_TOLERANCE,
     STABLE,
     AnyCase,
-    CaseAbsent,
     Floats,
     FrictionalCase,
     HardCase,
@@ -53,7 +49,6 @@ from verification.hard_cases.case import (
     TrajectoryCase,
     smallest_fault,
 )
-from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.exact import fractions_of
 from verification.methods import COMPARED
 
@@ -88,45 +83,6 @@ def run_in_world(scene: Scene, world: str) -> Run:
     if world != COULOMB:
         return run_world(scene, world)
     return require_complete(simulate(scene, RigidConstraints(friction="coulomb"), world=world))
-
-
-def judge_hard_cases(
-    methods: Iterable[str] | None = None, cases: Iterable[str] | None = None, simulate: Simulate = run_in_world,
-    failures: list[Failure] | None = None,
-) -> tuple[HardCaseVerdict, ...]:
-    """Return the verdict of each method or world on each case.
-
-    Parameters
-    ----------
-    methods : names of impact methods and of worlds; by default the methods or worlds of each case.
-    cases : names in `HARD_CASES`, by default all of them. Cases whose files are absent are left out;
-        `HARD_CASES[name]()` raises `CaseAbsent` with the reason.
-    simulate : function that runs a scene in a world: ``simulate(scene, world) -> Run``.
-    failures : receives exceptions other than `IapbError`, which is a verdict; without this list they propagate.
-
-    Returns
-    -------
-    tuple of HardCaseVerdict
-        One verdict for each pair of case and method, with its numbers.
-
-    Raises
-    ------
-    ArgumentError
-        A name in `cases` is not in `HARD_CASES`.
-    """
-    wanted = None if methods is None else tuple(methods)
-    names = tuple(HARD_CASES if cases is None else cases)
-    for name in names:
-        if name not in HARD_CASES:
-            raise ArgumentError("cases", name, one_of(name, HARD_CASES))
-    tried: list[tuple[str, AnyCase, str]] = []
-    for name in names:
-        with suppress(CaseAbsent):
-            case = HARD_CASES[name]()
-            tried += [(name, case, method) for method in methods_for(case) if wanted is None or method in wanted]
-    with one_thread():
-        return tuple(of_each(tried, lambda one: [judge_hard_case(one[1], one[2], simulate)], failures,
-                             lambda one: f"{one[0]}, {one[2]}"))  # fmt: skip
 
 
 def methods_for(case: AnyCase) -> tuple[str, ...]:

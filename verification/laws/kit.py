@@ -198,7 +198,6 @@ class PassivityReport(str):
             lines += ["", "as a test:", "", self.counterexample_test]
         return "\n".join(lines)
 
-
     def _hints(self) -> Iterator[str]:
         """Yield probable causes of failures that are no fault of the resolver's law."""
         answer, case, broken = self.returned, self.counterexample, self.broken_laws
@@ -383,7 +382,9 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
             own = mixed if name in UNEQUAL_LAWS else case
             # every second law with variants takes an impact of its own: a band of e, μ or κ is met several times
             if name in OF_VARIANTS and (done + k) % 2 and not large:
-                own = replace(trial.contract.draw(rng, _small(rng), trial.largest_condition),
+                number = int(rng.integers(1 << 30))
+                number += number % LARGE_EVERY == LARGE_EVERY // 2  # no large impact
+                own = replace(trial.contract.draw(rng, number, trial.largest_condition),
                               restitution=float(rng.uniform(trial.contract.least_restitution, 1.0)))
                 for single in OF_ONE_CALL:
                     if single in trial.laws:
@@ -396,12 +397,6 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
         if progress is not None and done > 0:
             progress(done, trial.impacts)
     return trial.impacts
-
-
-def _small(rng: np.random.Generator) -> int:
-    """Return the number of an impact that is not large."""
-    number = int(rng.integers(1 << 30))
-    return number + (number % LARGE_EVERY == LARGE_EVERY // 2)
 
 
 def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:

@@ -19,7 +19,6 @@ from verification.hard_cases import (
     TrajectoryCase,
     judge,
     judge_hard_case,
-    judge_hard_cases,
 )
 from verification.hard_cases.case import DEPENDS_ON_ROUNDING, NEWTON_COULOMB, STABLE, AnyCase
 from verification.hard_cases.judge import (
@@ -137,13 +136,12 @@ def test_a_call_that_needs_more_memory_than_its_limit_says_so() -> None:
         bounded_impact(case, "gram_pinv", limit=20.0, most_bytes=1 << 30)
 
 
-def test_a_case_whose_files_are_absent_says_which_and_is_left_out(
+def test_a_case_whose_files_are_absent_says_which(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("verification.hard_cases.shared_problems.FOLDER", tmp_path)
     with pytest.raises(CaseAbsent, match="bowl.5"):
         HARD_CASES["bowl_of_low_rank"]()
-    assert judge_hard_cases(cases=["bowl_of_low_rank", "two_balls_and_a_wall"]) == ()
 
 
 def test_a_bounded_call_gives_the_same_answer() -> None:
@@ -167,8 +165,3 @@ def test_a_world_that_makes_energy_is_seen() -> None:
 
     assert judge_hard_case(case, "PB").verdict == STABLE
     assert judge_hard_case(case, "PB", faulty).verdict == "gains energy"  # type: ignore[arg-type]
-
-
-def test_chosen_methods_and_cases_only() -> None:
-    found = judge_hard_cases(methods=["svd", "PB"], cases=["grazing", "chatter"])
-    assert [verdict.method for verdict in found] == ["svd", "PB"]

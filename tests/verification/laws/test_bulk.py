@@ -24,7 +24,6 @@ DEPTH = 2000
 
 def test_the_gain_stays_below_ten_d_eps_root_kappa() -> None:
     study = bulk_impacts(DEPTH, seed=1)
-    assert study.gain_error.max() < 1e-12
     assert (study.gain <= study.bound).all()
     assert study.condition.max() > 1e11 and study.contacts.max() > 90 and study.coordinates.max() > 25
     assert (study.rank < np.minimum(study.contacts, study.coordinates)).any()
@@ -42,9 +41,7 @@ def test_the_clamp_is_what_keeps_the_bound() -> None:
 
 
 def test_the_same_seed_gives_the_same_numbers_and_the_tables_add_up() -> None:
-    seen: list[tuple[int, int]] = []
-    first = bulk_impacts(300, seed=4, progress=lambda done, of: seen.append((done, of)))
-    assert seen[-1] == (300, 300)
+    first = bulk_impacts(300, seed=4)
     assert np.array_equal(first.gain, bulk_impacts(300, seed=4).gain)
     *rows, total = first.by_condition()
     assert sum(row["impacts"] for row in rows) == total["impacts"] == 300 and total[GAIN] == first.gain.max()

@@ -1,51 +1,44 @@
-"""The floating-point bounds grow as they must, refuse what they do not cover, and hold where exact numbers judge."""
+"""The radius of the last step exceeds the error that Coq proves; the family against the printed formula is exact."""
 
-import math
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from iapb.errors import ArgumentError
-from verification.proofs.bounds import gain_bound, projector_bound, promised_bound, radius_margins
 from verification.proofs.numbers import energy_factor, energy_factor_above_cutoff
 
 
-@given(d=st.integers(1, 60), exponent=st.floats(0.0, 20.0))
-def test_gain_bound_keeps_the_promise(d: int, exponent: float) -> None:
-    kappa = 10.0**exponent
-    assert gain_bound(d, kappa) <= promised_bound(d, kappa)
+def radius_margins(d: int) -> tuple[Fraction, ...]:
+    """Margins of the radius of `iapb.contact.kernels.passive.gain` above the need of Coq's `accepted_never_gains`.
 
+    `Passive.v` proves bounds of the error of `gain` (gain_error) and of its low part (loop_error). They are linear in
+    W = Σ|Δᵢ||Aᵢⱼ||sⱼ| of the high parts, η Σ|Δᵢ| and η = 2⁻¹⁰⁷⁴. This function returns the three exact coefficients of
+    (1 − u) r − error − u|low|, where r is a lower bound of the radius that `gain` returns: its S loses at most 2d + 1
+    roundings and η/2 in each product, `underflow` d + 1 and η/2. G = 1 + 2 (d + 2) u exceeds (1 + u) to the power
+    d + 2.
+    """
+    u, n = Fraction(1, 2**53), Fraction(d)
+    row, each, eta = np.vectorize(Fraction, otypes=[object])(np.eye(3, dtype=int))  # W, η |Δᵢ| of a row, η
+    grown = 1 + 2 * (n + 2) * u  # G
 
-@given(d=st.integers(1, 60), exponent=st.floats(0.0, 12.0))
-def test_bounds_grow_with_conditioning_and_size(d: int, exponent: float) -> None:
-    kappa = 10.0**exponent
-    assert gain_bound(d, 2.0 * kappa) > gain_bound(d, kappa)
-    assert projector_bound(d + 1, 1e-15) > projector_bound(d, 1e-15)
+    def error(total: Any, b: Any, g: Fraction, f: Any) -> Any:  # error_bound of Passive.v, s = S
+        one = total * u * grown + b + f
+        inner = (total * u * grown + b) * 2 * n + total * (2 * u + g + n * (u + g)) + f * n
+        return (inner + one * n * (n + 1) / 2) * grown * u
 
-
-@pytest.mark.parametrize(("d", "kappa"), [(0, 1.0), (3, 0.5), (3, math.nan), (3, 1e30)])
-def test_bounds_refuse_what_they_do_not_cover(d: int, kappa: float) -> None:
-    with pytest.raises(ArgumentError):
-        gain_bound(d, kappa)
-
-
-def test_projector_as_computed_stays_below_its_bound() -> None:
-    """u⁺ = u − 2QQᵀu in doubles, judged exactly: the bound holds, with no condition number in it."""
-    rng = np.random.default_rng(5)
-    for d in (2, 5, 12):
-        q = np.linalg.qr(rng.standard_normal((d, d)))[0][:, : max(1, d // 2)]
-        u = rng.standard_normal(d)
-        after = u - 2.0 * (q @ (q.T @ u))
-        departure = float(np.linalg.norm(q.T @ q - np.eye(q.shape[1]), 2))
-        gain = _square(after) / _square(u) - 1
-        assert gain <= projector_bound(d, departure + 4 * d * 2.0**-53)
-
-
-def _square(x: np.ndarray) -> Fraction:
-    return sum((Fraction(float(entry)) ** 2 for entry in x), Fraction(0))
+    g1, f1, first = 2 * u * (1 + u), Fraction(2), row * (1 + u) + each * n
+    row_error = error(first, each * 4, g1, each * f1) + row * u * u * (5 + 2 * u) + each * 5 * n
+    q, z, b = n * u * grown + u + g1, grown * n * (4 + f1), eta * 4
+    g, f = (1 + u) * (q + u), each * (1 + u) ** 2 * z + eta * 2
+    total = first * (1 + u) * grown + eta * n
+    left = (first * q * grown + each * z) * u * (3 + u) + first * u * (2 + u) * u * grown + eta * 5 * n
+    wanted = error(total, b, g, f) + left + row_error * (1 + u)
+    low = ((total * u * grown + b + f) * n + total * (u + g)) * grown
+    kept, share = 1 - (2 * n + 5) * u, 2 * (n + 6) ** 2 * u * u
+    underflow = kept * 2**54 * n - share * n
+    returned = (row * kept * share + each * underflow + eta * (underflow - 2)) * (1 - u)
+    return tuple(returned * (1 - u) - wanted - low * u)
 
 
 @pytest.mark.parametrize("sizes", [range(1, 130), (1000, 4096, 10_000, 2**15)])
