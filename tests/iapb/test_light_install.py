@@ -41,36 +41,28 @@ def test_the_extras_of_the_messages_are_those_of_the_project() -> None:
     assert bring == EXTRAS
 
 
-def test_simulate_and_resolve_need_no_extra() -> None:
-    done = run_without(set(EXTRAS), """
+WORKS = """
 from iapb import find_scene, resolve_impact, simulate
 print(simulate(find_scene("peg_corner"), steps=5).steps, resolve_impact([[1.0]], [[1.0]], [-1.0], 0.0).velocity)
-""")
-    assert done.stdout == "5 [0.]\n", done.stderr
+"""
+TOLD = "{} needs {}, which is not installed. Install it with: pip install '.[{}]' (in a checkout of iapb)"
+NEEDS = [("from iapb import simulate; simulate('peg_corner', world='ideal', steps=5)", "A reference", "scipy"),
+         ("from iapb import simulate; simulate('peg_corner', steps=5).save('never.h5')", "Run.save", "h5py"),
+         ("from verification import check_passivity", "verification.check_passivity", "hypothesis"),
+         ("from iapb.__main__ import main; print(main())", "iapb: The command", "typer")]
 
 
-def test_a_rigid_world_without_its_packages_says_which_extra_brings_them() -> None:
-    done = run_without(set(EXTRAS), "from iapb import simulate; simulate('peg_corner', world='ideal', steps=5)")
-    assert ("MissingDependencyError: A reference needs scipy, which is not installed. "
-            "Install it with: pip install '.[reference]' (in a checkout of iapb)") in done.stderr  # fmt: skip
-
-
-def test_saving_a_run_says_which_extra_it_needs() -> None:
-    done = run_without(set(EXTRAS), "from iapb import simulate; simulate('peg_corner', steps=5).save('never.h5')")
-    assert "MissingDependencyError: Run.save needs h5py, which is not installed." in done.stderr
-
-
-def test_a_name_that_needs_an_extra_says_which() -> None:
-    done = run_without({"hypothesis"}, "from verification import check_passivity")
-    assert ("MissingDependencyError: verification.check_passivity needs hypothesis, which is not installed. "
-            "Install it with: pip install '.[verify]' (in a checkout of iapb)") in done.stderr  # fmt: skip
-
-
-def test_the_command_without_its_packages_says_so_in_one_sentence() -> None:
-    done = run_without({"typer"}, "from iapb.__main__ import main; raise SystemExit(main())")
-    assert done.returncode == 1
-    assert done.stderr == ("iapb: The command needs typer, which is not installed. "
-                           "Install it with: pip install '.[verify]' (in a checkout of iapb)\n")  # fmt: skip
+def test_simulate_and_resolve_need_no_extra_and_what_does_says_which_in_one_sentence() -> None:
+    each = f"""
+for code in {[code for code, *_ in NEEDS]!r}:
+    try:
+        exec(code)
+    except Exception as error:
+        print(error, file=sys.stderr)
+"""
+    done = run_without(set(EXTRAS), WORKS + each)
+    assert done.stdout == "5 [0.]\n1\n", done.stderr
+    assert done.stderr.splitlines() == [TOLD.format(who, package, EXTRAS[package]) for _, who, package in NEEDS]
 
 
 @pytest.mark.parametrize("name", ["reference", "verification", "reports"])

@@ -65,13 +65,6 @@ def test_a_named_pair_comes_first() -> None:
     assert slid(on_slope(**values | {"contact.friction_pairs": []})) < 1e-3
 
 
-def test_each_body_has_its_own_friction_at_once() -> None:
-    two = on_slope().resolved()
-    two["bodies"].append(two["bodies"][0] | {"name": "ice", "position": [-1.0, 0.05, 0.0], "friction": 0.0})
-    run = simulate(Scene.model_validate(two | {"contact": two["contact"] | {"friction": 0.5}}))
-    assert run.q[-1, 0] < 1e-3 and run.q[-1, 3] + 1.0 == pytest.approx(FREE_SLIDE, rel=0.01)
-
-
 @pytest.mark.parametrize("law", [ImpulseAugmented(friction_in_impacts=True), Penalty()])
 def test_friction_of_a_body_acts_in_impacts_and_by_the_papers_law(law: Any) -> None:
     thrown = {"bodies.box.position": [0, 0.08, 0], "bodies.box.velocity": [1.0, -1.0, 0], "contact.friction_law":

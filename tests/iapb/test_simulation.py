@@ -171,23 +171,6 @@ def test_a_run_shows_itself_in_a_line_a_table_a_picture_and_as_a_dataset():
     assert len(run.plot().axes) == 3
 
 
-def test_a_run_is_saved_by_what_an_installed_package_offers(monkeypatch):
-    from iapb import lazy
-    from iapb.errors import MissingDependencyError
-
-    run = simulate("peg_corner", steps=3)
-    monkeypatch.setattr(lazy, "entry_points", lambda **asked: [])
-    with pytest.raises(MissingDependencyError, match=r"\[report\]"):
-        run.save("run.h5")
-
-    class Offered:
-        def load(self):
-            return lambda path, given, replace: (path, given is run, replace)
-
-    monkeypatch.setattr(lazy, "entry_points", lambda **asked: [Offered()])
-    assert run.save("run.h5", replace=True) == ("run.h5", True, True)
-
-
 CHANGES = [  # what scenes with equal bodies or walls might share
     {}, {"contact.friction": 0.2, "contact.friction_law": "coulomb"}, {"contact.restitution": 0.5},
     {"walls.floor.restitution": 0.6}, {"bodies.peg.mass": 1.5}, {"bodies.peg.position": [0.021, -0.0135, 0.02]},

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 from dataclasses import fields, replace
 from fractions import Fraction
-from hashlib import blake2b
 from typing import Any
 
 import numpy as np
@@ -246,14 +244,6 @@ def test_digest_is_of_m_made_again_which_in_the_engine_has_the_bits_of_the_step(
         if step in run.impacts.step:
             inside.append(digests(simulation.state.mass_matrix[None])[0])
     assert inside == run.impacts.mass_digest.tolist() and len(set(inside)) > 1
-
-
-def test_digests_are_those_of_little_endian_doubles_row_by_row() -> None:
-    mass = np.array([[[1.0, 2.0], [3.0, 4.0]]])
-    hashed = blake2b(struct.pack("<4d", 1.0, 2.0, 3.0, 4.0), digest_size=8).digest()
-    digest = int.from_bytes(hashed, "little", signed=True)
-    assert digests(mass).tolist() == digests(np.asfortranarray(mass)).tolist() == [digest]
-    assert digests(mass.transpose(0, 2, 1))[0] != digest
 
 
 def test_a_share_that_overflows_does_not_pass() -> None:

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from iapb.advice.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
-from iapb.compiled import block
 from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented, Penalty
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.scene import Scene, find_scene, load_scene, scene_names
@@ -137,20 +136,6 @@ def test_the_record_and_the_switches_are_one_decision() -> None:
         for name in ("gravity", "varying_inertia", "velocity_terms", "impulses", "unequal_restitution",
                      "impact_friction", "clustering"):
             assert getattr(simulation.world.switches, name) == (name in on), (law, name)
-
-
-@pytest.mark.parametrize("name", ["gravity", "velocity_terms", "clustering"])
-def test_an_effect_that_is_off_would_change_no_bit(name: str) -> None:
-    plain = PEG.with_values({"contact.cluster_distance": 0})
-    off, on = Simulation(plain), Simulation(plain)
-    assert not getattr(off.world.switches, name)
-    switches = on.world.switches._content._replace(**{name: True})
-    on.world = block(on.world._content._replace(switches=switches))
-    for _ in range(300):
-        off.step()
-        on.step()
-    assert off.state.contact_count[0] > 0
-    assert (off.state.q == on.state.q).all() and (off.state.v == on.state.v).all()
 
 
 @pytest.mark.parametrize("name", scene_names())

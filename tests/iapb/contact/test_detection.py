@@ -1,4 +1,4 @@
-"""Contacts of shapes against plain geometry in numpy; bits that units, order and place must not change."""
+"""Contacts of shapes against those of the reference; bits that units, order and place must not change."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.compiled import block
-from iapb.contact.geometry import ContactBuffer
-from iapb.contact.kernels.contact_set import ALIGNED_COSINE, cluster, mark_new
 from iapb.errors import IapbError
 from iapb.scene import Scene
-from iapb.schema import zeros_of
 from iapb.simulation import simulate
 from iapb.system import System
-from tests.iapb.contact.paper import contacts_between, scene_of, solids
+from reference.contact_finding import find_contacts
+from tests.iapb.contact.paper import scene_of
 
 SPACES = pytest.mark.parametrize("space", [False, True])
 Values = dict[str, Any]
@@ -67,31 +64,27 @@ def names_of(found: Any) -> list[tuple[int, int, int]]:
 
 @SPACES
 @pytest.mark.parametrize("margin", [0.0, 0.2, 3.0])
-def test_contacts_of_a_crowd_are_those_of_plain_geometry(space: bool, margin: float) -> None:
+def test_contacts_of_a_crowd_are_those_of_the_reference(space: bool, margin: float) -> None:
     """Every pair of kinds: number, order of the two, place, normal and gap; bodies and names of the contact."""
     counts = set()
     for seed in range(30):
-        scene = crowd(space, seed)
-        system = System(scene)
-        n, q = 3 if space else 2, thrown(system, seed, 0.5 + 0.5 * (margin > 1.0))
-        shapes = solids(scene, system.mechanism, q)
-        expected, found = contacts_between(shapes, margin), system.contacts_at(q, margin)
-        pairs = [name[:2] for name in names_of(found)]
-        assert sorted(set(pairs)) == sorted(expected)
-        assert len(set(names_of(found))) == len(pairs)  # each has a name of its own
-        for pair, wanted in expected.items():
-            mine = [i for i, each in enumerate(pairs) if each == pair]
-            counts.add((shapes[pair[0]].kind, shapes[pair[1]].kind, len(mine)))
-            rows = [[*found.point[i, :n], *found.normal[i, :n], found.gap[i]] for i in mine]
-            page = [[*touch.point, *touch.normal, touch.gap] for touch in wanted]
-            assert len(rows) == len(page)
-            apart = np.abs(np.array(rows)[:, None] - np.array(page)).max(axis=2)
+        system = System(crowd(space, seed))
+        q = thrown(system, seed, 0.5 + 0.5 * (margin > 1.0))
+        axes, places = system.mechanism.placements(q)
+        frames = np.append(axes, [np.eye(3)], 0), np.append(places, np.zeros((1, 3)), 0)  # the world's last
+        found = system.contacts_at(q, margin)
+        expected = find_contacts(system.shapes, system.pairs, *frames, margin)
+        pairs, theirs = ([name[:2] for name in names_of(each)] for each in (found, expected))
+        assert sorted(pairs) == sorted(theirs) and len(set(names_of(found))) == len(pairs)  # each has a name of its own
+        for pair in set(pairs):
+            rows, page = (np.column_stack([each.point, each.normal, each.gap, each.body_a, each.body_b])[
+                [name[:2] == pair for name in names_of(each)]] for each in (found, expected))
+            counts.add(len(rows))
+            apart = np.abs(rows[:, None] - page).max(axis=2)
             ties = int(len(rows) == 4)  # which corner of a large overlap stays may tie, and rounding decides
             assert all(np.sum(apart.min(axis=axis) >= 1e-10) <= ties for axis in (0, 1)), pair
-            for i in mine:
-                assert (found.body_a[i], found.body_b[i]) == (shapes[pair[0]].body, shapes[pair[1]].body)
         assert space or not (found.point[:, 2].any() or found.normal[:, 2].any())
-    assert {number for *_, number in counts} >= ({1, 3, 4, 8} if space and margin > 1.0 else {1, 2})
+    assert counts >= ({1, 3, 4, 8} if space and margin > 1.0 else {1, 2})
 
 
 @SPACES
@@ -246,24 +239,6 @@ def test_faces_of_two_cubes_never_share_a_name() -> None:
             assert len(found.gap) == 4
             for feature in found.feature.tolist():
                 assert owners.setdefault(feature, owner)[1:] == owner[1:]
-
-
-@pytest.mark.parametrize(("cosine", "old"), [(ALIGNED_COSINE, True), (0.0, False), (-1.0, False),
-                                             (np.nextafter(ALIGNED_COSINE, 0.0), False)])
-@pytest.mark.parametrize("swapped", [False, True])
-def test_what_faces_as_a_neighbour_did_is_the_same_contact_and_nothing_else(
-    cosine: float, old: bool, swapped: bool
-) -> None:
-    """Two contacts on one place: of one surface up to the angle, and never of other bodies."""
-    both = zeros_of(ContactBuffer, contact=2)
-    both.normal[:], both.gap[:], both.feature[:] = [[1.0, 0.0, 0.0], [cosine, 0.0, 0.0]], -1.0, [0, 1]
-    both.shape_b[:] = 1
-    both.body_a[:], both.body_b[:] = ([0, 1], [1, 0]) if swapped else ([0, 0], [1, 1])
-    before, same = zeros_of(ContactBuffer, contact=1), old and not swapped
-    for field in both._fields:
-        getattr(before, field)[:] = getattr(both, field)[1:]
-    mark_new(both, 1, before, 1, 1.0)
-    assert both.is_new[0] != same and cluster(block({"cluster_distance": 1.0}), both, 2) == (1 if same else 2)
 
 
 # --- the whole of a run ----------------------------------------------------------------------------------------------

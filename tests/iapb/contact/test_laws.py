@@ -86,25 +86,6 @@ def test_spreading_delivers_the_prescribed_velocity_for_plastic_impacts_only(
 # --- what must change no bit -----------------------------------------------------------------------------------------
 
 
-def together(scene: Scene, before: int, after: int) -> Scene:
-    """The scene with copies of its bodies 5 m higher each, listed before and after its own."""
-    own = scene.resolved()["bodies"]
-    copies = [body | {"name": f"{body['name']}_{k}", "position": [body["position"][0], 5.0 + k, 0.0]}
-              for k in range(before + after) for body in own]
-    cut = before * len(own)
-    return scene.with_values({"bodies": [*copies[:cut], *own, *copies[cut:]]})
-
-
-@pytest.mark.parametrize(("before", "after"), [(0, 1), (1, 0), (2, 1)])
-def test_impacts_of_a_group_do_not_depend_on_what_collides_elsewhere(before: int, after: int) -> None:
-    scene = shipped("two_discs")
-    alone, among = simulate(scene, steps=100), simulate(together(scene, before, after), steps=100)
-    own, mine = slice(6 * before, 6 * before + 6), among.impacts.group == 2 * before
-    assert len(alone.impacts.step) == mine.sum() == 1 and len(among.impacts.step) == 1 + before + after
-    np.testing.assert_array_equal(among.v[:, own], alone.v)
-    np.testing.assert_array_equal(among.impacts.impulse[mine][:, own], alone.impacts.impulse)
-
-
 @pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
 def test_equal_restitution_changes_no_bit_wherever_it_is_written(e: float) -> None:
     plain, walls = simulate(PEG.with_values({"contact.restitution": e})), [wall.name for wall in PEG.walls]

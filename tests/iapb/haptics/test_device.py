@@ -51,17 +51,6 @@ def test_delay_shifts_forces_and_readings_by_its_steps(forces, delay):
     assert late.read().q == pytest.approx(history[max(len(history) - 1 - delay, 0)], abs=0.0)
 
 
-@given(forces)
-def test_actuators_clip_and_the_hand_does_not(forces):
-    limit = np.array([15.0, 15.0, 1.0])
-    device, clipped = SimulatedDevice(MASS, REST, dt=DT, force_limit=limit), SimulatedDevice(MASS, REST, dt=DT)
-    device.hand_force = clipped.hand_force = np.array([50.0, 0.0, 0.0])
-    for force in forces:
-        device.apply(force)
-        clipped.apply(np.clip(force, -limit, limit))
-    assert np.array_equal(device.q, clipped.q)
-
-
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.floats(1e-6, 1e-2))
 def test_a_reading_is_a_multiple_of_the_resolution_and_half_a_step_off_at_most(start, step):
     device = SimulatedDevice(MASS, start, [0.3, -0.2, 0.1], dt=DT, resolution=[step, step, 0.0])
@@ -71,15 +60,6 @@ def test_a_reading_is_a_multiple_of_the_resolution_and_half_a_step_off_at_most(s
     assert read.q[:2] / step == pytest.approx(np.round(read.q[:2] / step), abs=1e-6)
     assert read.q[2] == device.q[2] and read.v[2] == device.v[2]
     assert np.abs(read.v[:2] - device.v[:2]).max() <= step / DT * (1.0 + 1e-9)  # it jumps by one step at most
-
-
-def test_physical_damping_takes_energy():
-    device = SimulatedDevice(MASS, REST, [1.0, -1.0, 2.0], dt=DT, damping=[5.0, 5.0, 0.5])
-    energies = []
-    for _ in range(50):
-        energies.append(device.v @ MASS @ device.v)
-        device.apply(REST)
-    assert all(later < before for before, later in zip(energies, energies[1:], strict=False))
 
 
 GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)

@@ -61,8 +61,6 @@ PAIR = {"between": ["arm", "puck"], "friction": 0.1}
 # path: values that are refused there; the mistake names the field
 IN_THE_PLANE: dict[str, list[Any]] = {
     "name": NOT_A_NAME,
-    "title": [3, None, "x" * 2001],
-    "source": [3, None, "x" * 2001],
     "rate": [*NOT_POSITIVE, 1.1e6],
     "duration": [*NOT_POSITIVE, 1e-4, 1e5],
     "integrator": ["leapfrog"],
@@ -71,20 +69,10 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "bodies.puck.name": [*NOT_A_NAME, "arm", "world"],
     "bodies.arm.parent": [*NOT_A_NAME, "puck", "arm", "nobody"],
     "bodies.arm.joint": ["hinge", None, 3, "planar", "free_flyer"],
-    "bodies.slide.axis": [*NOT_A_VECTOR, [0.0, 0.0]],
     "bodies.arm.axis": [[1.0, 0.0]],
-    "bodies.arm.origin": NOT_A_VECTOR,
-    "bodies.arm.angle": NOT_A_NUMBER,
-    "bodies.arm.center_of_mass": [*NOT_A_VECTOR, [0.0, 0.0]],
     "bodies.arm.mass": [*NEGATIVE, 0.0],
-    "bodies.slide.mass": NOT_POSITIVE,
-    "bodies.puck.mass": NOT_POSITIVE,
-    "bodies.puck.inertia": NOT_POSITIVE,
     "bodies.puck.density": [value for value in NOT_POSITIVE if value is not None],
     "bodies.slide.density": [1.0],  # no shapes
-    "bodies.arm.inertia": NEGATIVE,
-    "bodies.arm.restitution": [*OWN, 1.001],
-    "bodies.arm.friction": OWN,
     "bodies.arm.joint_damping": [*(x for x in NEGATIVE if x != [1]), [1.0, 1.0], [-1.0]],
     "bodies.puck.joint_damping": [1.0, [1.0, 1.0], [1.0, 1.0, -1.0]],
     "bodies.arm.joint_limits": [1.0, [1.0], [1.0, 2.0], [1.0, -1.0], [0.0, 0.0], ["x", 1.0], [-1.0, math.nan]],
@@ -92,9 +80,6 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "bodies.base.joint_limits": [[-1.0, 1.0]],
     "bodies.arm.shapes": [None, 3, [3], [{"kind": "capsule"}], [{"kind": "half_plane"}], [{}]],
     "bodies.arm.shapes.0.size": [[0.0, 1.0], [1.0, -1.0], [1.0], 1.0],
-    "bodies.arm.shapes.0.center": NOT_A_VECTOR,
-    "bodies.arm.shapes.0.angle": NOT_A_NUMBER,
-    "bodies.puck.shapes.0.radius": NOT_POSITIVE,
     "bodies.base.position": [[0.0]],
     "bodies.arm.position": [[0.0, 0.0], ["x"], 0.0, [math.nan]],
     "bodies.puck.position": [[0.0], [0.0, 0.0, 0.0, 0.0]],
@@ -102,34 +87,21 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "walls": [None, 3, [3], [{"kind": "circle", "radius": 1}]],
     "walls.post.name": [*NOT_A_NAME, "floor"],
     "walls.floor.kind": ["plane", None, "box"],
-    "walls.floor.point": NOT_A_VECTOR,
-    "walls.floor.normal": [*NOT_A_VECTOR, [0.0, 0.0]],
-    "walls.floor.friction": OWN,
-    "walls.floor.restitution": [*OWN, 1.001],
     "walls.wedge.vertices": [
         3, [[0, 0], [1, 0]], [[0, 0], [1, 0], [2, 0]], [[0, 0], [1, 0], [1, 0], [0, 1]], [[0, 0, 0], [1, 0], [0, 1]],
         [[0, 0], [2, 0], [2, 2], [1, 0.5]], [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], [[0, 0], [1, 1], [1, 0], [0, 1]],
         [[math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)] for k in range(5)]],  # a pentagram
-    "contact.auto": [1, "true", None],
-    "contact.resting_start": [1, "true", None],
     "contact.forces": ["explicit", None],
     "contact.stiffness": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
     "contact.damping": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
     "contact.penalty": ["soft", None, True],
-    "contact.friction": NEGATIVE,
     "contact.friction_pairs": [1, [1], [PAIR | {"between": ["arm", "nobody"]}], [PAIR | {"between": ["arm"]}],
                                [PAIR | {"friction": -1}], [PAIR, PAIR | {"between": ["puck", "arm"]}],
                                [PAIR | {"between": ["arm", "arm"]}]],
     "contact.friction_law": ["dry", "Coulomb", None, True],
-    "contact.friction_velocity": NOT_POSITIVE,
     "contact.restitution": [*NEGATIVE, 1.001],
-    "contact.approach_velocity": NEGATIVE,
-    "contact.cluster_distance": NEGATIVE,
-    "contact.coherence_distance": NEGATIVE,
     "contact.self_collision_rows": ["both", None],
-    "contact.self_collisions": [1, "true", None],
     "hand.body": [*NOT_A_NAME, "nobody", "floor", "foot"],
-    "hand.point": NOT_A_VECTOR,
     "hand.force": [[1.0, 2.0], 3.0, None, [math.nan, 0.0, 0.0]],
     "hand.force_table": [1.0, [1.0], [[0.0, 1.0]], [[0.0, 1.0, 1.0, "x"]], [[0.0] * 4, [0.0] * 4]],
     "hand.force_function": ["t", ["t"], [None, "t", "t"], *([text, "0", "0"] for text in (
@@ -138,13 +110,23 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "device": [[], 3],
     "device.force_limit": [*NOT_A_PAIR_OF_GAINS, [0, 1]],
     "device.delay": [-1, 1001, 1.0, "1", None, True],
-    "device.position_resolution": NOT_A_PAIR_OF_GAINS,
-    "device.damping": NOT_A_PAIR_OF_GAINS,
     "device.waveform": ["bell", "", "Step", 0, None, True],
-    "couplings.four_channel.stiffness": NOT_A_PAIR_OF_GAINS,
-    "couplings.four_channel.damping": NOT_A_PAIR_OF_GAINS,
-    "couplings.unilateral.stiffness": NOT_A_PAIR_OF_GAINS,
-    "couplings.unilateral.damping": NOT_A_PAIR_OF_GAINS,
+    **{path: values for values, paths in (
+        (NOT_POSITIVE, "bodies.slide.mass bodies.puck.mass bodies.puck.inertia bodies.puck.shapes.0.radius "
+                       "contact.friction_velocity"),
+        (NEGATIVE, "bodies.arm.inertia contact.friction contact.approach_velocity contact.cluster_distance "
+                   "contact.coherence_distance"),
+        (NOT_A_NUMBER, "bodies.arm.angle bodies.arm.shapes.0.angle"),
+        (NOT_A_VECTOR, "bodies.arm.origin bodies.arm.shapes.0.center walls.floor.point hand.point"),
+        (OWN, "bodies.arm.friction walls.floor.friction"),
+        ([*OWN, 1.001], "bodies.arm.restitution walls.floor.restitution"),
+        (NOT_A_PAIR_OF_GAINS, "device.position_resolution device.damping couplings.four_channel.stiffness "
+                              "couplings.four_channel.damping couplings.unilateral.stiffness "
+                              "couplings.unilateral.damping"),
+        ([1, "true", None], "contact.auto contact.resting_start contact.self_collisions"),
+        ([3, None, "x" * 2001], "title source"),
+        ([*NOT_A_VECTOR, [0.0, 0.0]], "bodies.slide.axis bodies.arm.center_of_mass walls.floor.normal"),
+    ) for path in paths.split()},
 }
 IN_SPACE: dict[str, list[Any]] = {
     "dimensions": [2, None],
@@ -257,7 +239,7 @@ def test_bodies_of_one_tree_stand_together() -> None:
     ("a: &x [1, *x]\n", 1, "levels"),
     ("? [1, 2]\n: 3\n", 1, "name of a field"),
     ("a: " + "[" * 100 + "]" * 100, 1, "levels"),
-    ("a: " + "[" * 50_000, 1, "YAML"),
+    ("a: " + "[" * 5_000, 1, "YAML"),
     ("a: &a [" + "1, " * 400 + "1]\nb: &b [" + "*a, " * 400 + "*a]\nc: [" + "*b, " * 9 + "*b]\n", 1, "smaller"),
     ("#" * 1_000_001, 1, "at most 1000000"),
     *((text, 1, "mapping") for text in ("", "3\n", "[]\n", "just words\n", "~\n")),
@@ -324,7 +306,7 @@ def test_any_text_is_a_scene_or_a_scene_error(text: str) -> None:
 
 @pytest.mark.parametrize("unit", ["[", "{a: ", "- ", "? ", "a:\n ", "&a ", "*a ", "!a ", "'", '"', "|\n", "a: &a [*a,"])
 def test_endless_repetition_ends_soon(unit: str) -> None:
-    check(unit * (50_000 // len(unit)))
+    check(unit * (5_000 // len(unit)))
 
 
 def check(text: str) -> None:

@@ -39,32 +39,6 @@ def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(name: str, h
     assert mechanism.kinetic_energy(q, v) == pytest.approx(7.0 / 3.0, rel=1e-14)
 
 
-def test_point_mass_reading_of_the_arm_starts_with_5_joules() -> None:
-    points = {f"bodies.{link}.{field}": value for link in ("upper_arm", "forearm")
-              for field, value in (("center_of_mass", [1, 0]), ("inertia", 0))}
-    scene = load_scene(find_scene("two_link_arm_a")).with_values(points)
-    assert mechanism_of(scene).kinetic_energy(*start_of(scene)) == pytest.approx(5.0, rel=1e-14)
-
-
-@pytest.mark.parametrize("name", ["peg_corner", "peg_room"])
-def test_peg_has_the_numbers_of_the_paper_and_is_pushed_into_the_corner(name: str) -> None:
-    scene = load_scene(find_scene(name))
-    peg = scene.bodies[0]
-    assert (scene.rate, peg.mass, peg.inertia, peg.shapes[0].size) == (512.0, 2.0, 0.005, (0.021, 0.0105))  # type: ignore[union-attr]
-    assert (scene.contact.stiffness, scene.contact.damping, scene.contact.restitution) == (1000.0, 50.0, 0.0)
-    assert scene.hand is not None and scene.device is not None and scene.device.force_limit == (15.0, 15.0, 1.0)
-    normals = np.array([wall.normal for wall in scene.walls if wall.name in ("right_wall", "floor")])  # type: ignore[union-attr]
-    assert (normals @ np.array(scene.hand.force[:2]) < 0.0).all()  # into both walls of the corner
-
-
-def test_table_1_stands_in_the_peg_scenes() -> None:
-    for name in ("peg_corner", "peg_hole", "peg_room"):
-        couplings = load_scene(find_scene(name)).couplings
-        assert couplings.model_dump() == {
-            "four_channel": {"stiffness": (100.0, 100.0, 0.5), "damping": (70.0, 70.0, 0.375)},
-            "unilateral": {"stiffness": (1000.0, 1000.0, 2.5), "damping": (50.0, 50.0, 0.125)}}
-
-
 @pytest.mark.parametrize("depth", [1e-6, 1e-5, 7e-5])
 def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float) -> None:
     """Six contacts approach at once wherever in the step the peg arrives; their rows have rank 3."""
