@@ -59,14 +59,13 @@ def test_a_truth_does_not_depend_on_rounding(case: TruthCase) -> None:
     scene = scene_of(case.scene)
     truth, start = scene_truth(scene, case.duration, case.coupled), System(scene).make_state()
     time = np.linspace(0.0, case.duration, 101)
-    for seed in range(2):
-        rng = np.random.default_rng(seed)
-        size = 10.0 ** rng.uniform(-14.0, -12.0)
-        near = tuple(x * (1.0 + size * rng.uniform(-1.0, 1.0, x.shape)) for x in (start.q, start.v))
-        other = scene_truth(scene, case.duration, case.coupled, start=near, computations=COMPUTATIONS[:1])
-        assert len(other.events) == len(truth.events)
-        assert other.events == pytest.approx(truth.events, abs=truth.bound.instant)
-        assert np.abs(other.state(time)[0] - truth.state(time)[0]).max() <= truth.bound.position
+    rng = np.random.default_rng(0)
+    size = 10.0 ** rng.uniform(-14.0, -12.0)
+    near = tuple(x * (1.0 + size * rng.uniform(-1.0, 1.0, x.shape)) for x in (start.q, start.v))
+    other = scene_truth(scene, case.duration, case.coupled, start=near, computations=COMPUTATIONS[:1])
+    assert len(other.events) == len(truth.events)
+    assert other.events == pytest.approx(truth.events, abs=truth.bound.instant)
+    assert np.abs(other.state(time)[0] - truth.state(time)[0]).max() <= truth.bound.position
 
 
 def test_a_truth_that_is_not_known_well_enough_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

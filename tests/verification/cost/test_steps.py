@@ -7,7 +7,6 @@ import pytest
 
 from iapb.system import System
 from verification.check import Study
-from verification.claims import CLAIMS
 from verification.cost import robots, steps
 from verification.cost.calls import PRINTED
 from verification.cost.growth import (
@@ -92,11 +91,6 @@ def test_the_most_contacts_are_the_last_in_time() -> None:
     rows = [("a", 3, 6, 0), ("a", 3, 12, ALLOWED), ("a", 3, 30, ALLOWED + 1), ("b", 3, 6, 9)]
     trials = table_from(dict(zip(keys, row, strict=True)) for row in rows)
     assert most_contacts(trials) == {"a": {3: 12}, "b": {3: 0}}
-
-
-@pytest.mark.parametrize(("late", "outcome"), [(0, True), (2, False)])
-def test_c19_fails_wherever_calls_are_late(late: int, outcome: bool) -> None:
-    assert CLAIMS["C19"].holds({"late calls": late, "contacts": 6}) is outcome
 
 
 def test_exponents_and_the_steepest_range_are_those_of_the_method_and_the_axis() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -11,55 +10,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from verification.hard_cases import (
-    HARD_CASES,
-    CaseAbsent,
-    HardCase,
-    HardCaseVerdict,
-    TrajectoryCase,
-    judge,
-    judge_hard_case,
-)
+from verification.hard_cases import HARD_CASES, CaseAbsent, HardCase, HardCaseVerdict, TrajectoryCase, judge
+from verification.hard_cases import judge_hard_case as judged
 from verification.hard_cases.case import DEPENDS_ON_ROUNDING, NEWTON_COULOMB, STABLE, AnyCase
-from verification.hard_cases.judge import (
-    WITHOUT_CLAMP,
-    OutOfMemory,
-    TimedOut,
-    bounded_impact,
-    faulty_answers,
-    faulty_motion,
-    methods_for,
-    run_in_world,
-)
 
 
-@pytest.fixture(scope="module")
-def case_of() -> Callable[[str], AnyCase]:
+def case_of(name: str) -> AnyCase:
     """A case by its name; a case of absent files skips the test, with the reason."""
-
-    def make(name: str) -> AnyCase:
-        try:
-            return HARD_CASES[name]()
-        except CaseAbsent as absent:
-            pytest.skip(str(absent))
-
-    return make
+    try:
+        return HARD_CASES[name]()
+    except CaseAbsent as absent:
+        pytest.skip(str(absent))
 
 
 # Where the engine is not stable, and says so: springs read once a step pass a blow on with a gain.
-BEYOND_US = {
-    "wall_far_beyond_the_bound": "gains energy",
-}
+BEYOND_US = {"wall_far_beyond_the_bound": "gains energy"}
 LARGEST_FAULT = 0.1
 
 
 @cache
 def _judged(name: str, method: str) -> HardCaseVerdict:
-    return judge_hard_case(HARD_CASES[name](), method)
+    return judged(HARD_CASES[name](), method)
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
-def test_the_engine_is_stable_but_where_it_says_not(name: str, case_of: Callable[[str], AnyCase]) -> None:
+def test_the_engine_is_stable_but_where_it_says_not(name: str) -> None:
     case = case_of(name)
     verdict = _judged(name, "factored" if isinstance(case, HardCase) else "IAPB")
     assert verdict.verdict == BEYOND_US.get(name, "stable"), verdict
@@ -68,10 +43,10 @@ def test_the_engine_is_stable_but_where_it_says_not(name: str, case_of: Callable
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
-def test_a_fault_of_a_tenth_in_the_answer_is_seen(name: str, case_of: Callable[[str], AnyCase]) -> None:
+def test_a_fault_of_a_tenth_in_the_answer_is_seen(name: str) -> None:
     """In the engine's answer or, where that is wrong already, in the first stable one."""
     case, red = case_of(name), []
-    for method in methods_for(case):
+    for method in judge.methods_for(case):
         verdict = _judged(name, method)
         if verdict.verdict != STABLE:
             continue
@@ -85,55 +60,47 @@ def test_a_fault_of_a_tenth_in_the_answer_is_seen(name: str, case_of: Callable[[
 def _with_a_fault(case: AnyCase, method: str, size: float) -> str:
     """The verdict on the answer with a fault of that relative size, of all faults the kindest one."""
     if isinstance(case, TrajectoryCase):
-        run = faulty_motion(run_in_world(case.scene, method), size)
+        run = judge.faulty_motion(judge.run_in_world(case.scene, method), size)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("verification.hard_cases.judge.run_in_world", lambda *_: run)
-            return judge_hard_case(case, method, lambda *_: run).verdict
+            return judged(case, method, lambda *_: run).verdict
     answer = judge.resolve_once(case, method)
     verdicts = []
-    for wrong in faulty_answers(case, answer.velocity):
+    for wrong in judge.faulty_answers(case, answer.velocity):
         with pytest.MonkeyPatch.context() as patch:
             faulty = answer._replace(velocity=answer.velocity + size * wrong)
             patch.setattr(judge, "_answer", lambda *_, faulty=faulty: faulty)
-            verdicts.append(judge_hard_case(case, method).verdict)
+            verdicts.append(judged(case, method).verdict)
     return "stable" if "stable" in verdicts else verdicts[0]
 
 
-@pytest.mark.parametrize(
-    ("name", "method", "verdict"),
-    [
-        ("mass_ratio", "gram_pinv", "gains energy"),
-        ("printed_formula_gains", "gram_pinv", DEPENDS_ON_ROUNDING),
-        ("nearly_parallel_normals", "damped", "restitution unmet"),
-        ("tiny_lever_arm", "gram_pinv", "wrong motion"),
-        ("hilbert_rows", "gram_cholesky", "refused"),
-        ("light_direction", WITHOUT_CLAMP, "gains energy"),
-        ("double_pendulum_with_friction", NEWTON_COULOMB, "gains energy"),
-        ("wall_beyond_the_bound", "PB", "gains energy"),
-        ("chatter", "PB", "wrong motion"),
-        ("two_balls_and_a_wall", "PB", "wrong motion"),
-    ],
-)
-def test_the_verdict_can_be_other_than_stable(
-    name: str, method: str, verdict: str, case_of: Callable[[str], AnyCase]
-) -> None:
-    judged = judge_hard_case(case_of(name), method)
-    assert judged.verdict == verdict, judged
+@pytest.mark.parametrize(("name", "method", "verdict"), [
+    ("mass_ratio", "gram_pinv", "gains energy"),
+    ("printed_formula_gains", "gram_pinv", DEPENDS_ON_ROUNDING),
+    ("nearly_parallel_normals", "damped", "restitution unmet"),
+    ("tiny_lever_arm", "gram_pinv", "wrong motion"),
+    ("hilbert_rows", "gram_cholesky", "refused"),
+    ("light_direction", judge.WITHOUT_CLAMP, "gains energy"),
+    ("double_pendulum_with_friction", NEWTON_COULOMB, "gains energy"),
+    ("wall_beyond_the_bound", "PB", "gains energy"),
+    ("chatter", "PB", "wrong motion"),
+    ("two_balls_and_a_wall", "PB", "wrong motion"),
+])
+def test_the_verdict_can_be_other_than_stable(name: str, method: str, verdict: str) -> None:
+    assert (found := judged(case_of(name), method)).verdict == verdict, found
 
 
 def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_cut() -> None:
     case = HARD_CASES["ten_thousand_contacts"]()
-    assert isinstance(case, HardCase)
-    with pytest.raises(TimedOut, match=r"cut after 0\.05 s"):
-        bounded_impact(case, "gram_pinv", limit=0.05)
+    with pytest.raises(judge.TimedOut, match=r"cut after 0\.05 s"):
+        judge.bounded_impact(case, "gram_pinv", limit=0.05)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="memory is limited on POSIX systems only")
 def test_a_call_that_needs_more_memory_than_its_limit_says_so() -> None:
     case = HARD_CASES["ten_thousand_contacts"]()
-    assert isinstance(case, HardCase)
-    with pytest.raises(OutOfMemory, match="more than 1 GiB"):
-        bounded_impact(case, "gram_pinv", limit=20.0, most_bytes=1 << 30)
+    with pytest.raises(judge.OutOfMemory, match="more than 1 GiB"):
+        judge.bounded_impact(case, "gram_pinv", limit=20.0, most_bytes=1 << 30)
 
 
 def test_a_case_whose_files_are_absent_says_which(
@@ -146,8 +113,7 @@ def test_a_case_whose_files_are_absent_says_which(
 
 def test_a_bounded_call_gives_the_same_answer() -> None:
     case = HARD_CASES["hundred_contacts"]()
-    assert isinstance(case, HardCase)
-    bounded, here = bounded_impact(case, "gram_pinv", limit=60.0), judge_hard_case(case, "gram_pinv")
+    bounded, here = judge.bounded_impact(case, "gram_pinv", limit=60.0), judged(case, "gram_pinv")
     assert bounded.rank == here.rank
     assert here.verdict == STABLE
     assert np.allclose(bounded.velocity, [float(x) for x in case.truth.velocity], rtol=1e-12)
@@ -156,12 +122,11 @@ def test_a_bounded_call_gives_the_same_answer() -> None:
 def test_a_world_that_makes_energy_is_seen() -> None:
     """A planted fault: the run of a wall whose velocities grow by a thousandth in each step."""
     case = HARD_CASES["wall_at_the_bound"]()
-    assert isinstance(case, TrajectoryCase)
 
     def faulty(scene: object, world: str) -> object:
-        run = run_in_world(case.scene, world)
+        run = judge.run_in_world(case.scene, world)
         growing = run.energy["kinetic"] * 1.001 ** np.arange(run.steps + 1)
         return replace(run, energy={**run.energy, "kinetic": growing})
 
-    assert judge_hard_case(case, "PB").verdict == STABLE
-    assert judge_hard_case(case, "PB", faulty).verdict == "gains energy"  # type: ignore[arg-type]
+    assert judged(case, "PB").verdict == STABLE
+    assert judged(case, "PB", faulty).verdict == "gains energy"  # type: ignore[arg-type]

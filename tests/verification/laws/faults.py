@@ -154,7 +154,6 @@ def friction_of_one_alone(M: Floats, J: Floats, T: Floats, v: Floats, e: float, 
     return moreau(M, J, T, v, e, mu if len(J) == 1 else 0.0 * mu)
 
 
-SOUND = {"unilateral": (newton, poisson), "frictional": (moreau,)}
 # contract and name -> the law that must detect it, and the resolver
 PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
     ("unilateral", "wrong sign"): ("kinetic_energy", lambda M, J, v, e: _pushing(M, J, v, -(1.0 + e))),

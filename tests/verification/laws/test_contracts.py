@@ -9,26 +9,15 @@ import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import ArgumentError
-from tests.verification.laws.faults import PUSHING, SOUND, TOO_MUCH, newton, no_friction, returns_too_much
+from tests.verification.laws.faults import PUSHING, TOO_MUCH, newton, no_friction, returns_too_much
 from verification import check_passivity
 from verification.laws import CONTRACTS, sound_resolver
-
-SOUND_ONES = [(contract, resolver) for contract, resolvers in SOUND.items() for resolver in resolvers]
-SOUND_ONES.append(("unilateral", partial(resolve_impact, method="poisson")))
-
-
-@pytest.mark.parametrize(("contract", "resolver"), SOUND_ONES)
-def test_textbook_resolvers_keep_all_laws_of_their_contract(contract: str, resolver: object) -> None:
-    laws = [name for name in CONTRACTS[contract].laws if name != "exact_energy"]
-    report = check_passivity(resolver, contract=contract, laws=laws, impacts=150)
-    assert report.passed and ("not judged: how much friction" in report) == (contract == "frictional"), report
-    assert all(verdict.checked > 0 for verdict in report.verdicts)
 
 
 @pytest.mark.parametrize(("contract", "name"), PUSHING)
 def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> None:
     law, resolver = PUSHING[contract, name]
-    report = check_passivity(resolver, contract=contract, laws=[law], impacts=80, search=10)
+    report = check_passivity(resolver, contract=contract, laws=[law], impacts=80, search=0)
     assert report.broken_laws == (law,)
     with pytest.raises(AssertionError, match=law):
         exec(report.counterexample_test + f"\n\ntest_{law}()", {"resolver": resolver})
