@@ -107,12 +107,6 @@ def coulomb_ccp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
     return newton_lcp(replace(problem, relaxed=True), solver)
 
 
-def per_body_rows(jacobian_a: ArrayLike, jacobian_b: ArrayLike) -> Floats:
-    """Return the rows nᵀJ_a and nᵀJ_b of (13)-(14) (each (c, d)), without zero rows; (12) has their difference."""
-    stacked = np.vstack([np.asarray(jacobian_a, np.float64), np.asarray(jacobian_b, np.float64)])
-    return stacked[np.abs(stacked).max(axis=1, initial=0.0) > 0.0]
-
-
 @dataclass(frozen=True)
 class NonNegativeImpulse:
     """Non-negative impulses whose Jᵀp is nearest to a generalized impulse."""
@@ -191,7 +185,7 @@ LAWS: dict[str, Law] = {law.name: law for law in (
         "Glocker and Pfeiffer 1995; Anitescu and Potra 1997", "any E in [0, 1], any gamma_minus", True, poisson),
     Law("newton_equality", "gamma_plus = -E gamma_minus, p of either sign",
         "Constantinescu, Salcudean, Croft 2005, (15)-(21)", "one e for all contacts", True, newton_equality),
-    Law("per_body_equality", "newton_equality on the rows of each body apart (`per_body_rows`)",
+    Law("per_body_equality", "newton_equality on the rows of each body apart",
         "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
         "one e for all contacts; momentum is not conserved at self-collisions", True, newton_equality),
     Law("coulomb_ncp", "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",

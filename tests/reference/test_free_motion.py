@@ -103,7 +103,7 @@ def test_a_spinning_sphere_flies_straight(moved: Moved, spin: float) -> None:
 
 
 def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
-    """Random trees on a free flyer, in free motion for a second at up to 30 rad/s."""
+    """Random trees on a free flyer, in free motion for 0.3 s at up to 30 rad/s."""
     for seed in range(3):
         rng = np.random.default_rng(seed)
         tree = random_mechanism(rng, 3, ("revolute", "spherical")).bodies
@@ -112,7 +112,7 @@ def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
         q = mechanics.normalize(np.ones(mechanics.nq))
         v = rng.uniform(-30.0, 30.0, mechanics.nv)
         energy, momentum = mechanics.kinetic_energy(q, v), mechanics.centroidal_momentum(q, v)
-        for _ in range(1000):
+        for _ in range(300):
             q, v = free_motion(mechanics, q, v, 1e-3)
         assert mechanics.kinetic_energy(q, v) == pytest.approx(energy, rel=1e-10)
         assert mechanics.centroidal_momentum(q, v) == pytest.approx(momentum, abs=1e-10 * np.abs(momentum).max())
@@ -159,10 +159,10 @@ def test_a_billiard_ball_ends_rolling(turning: float, share: float) -> None:
     """
     run = simulate(scene_of(BALL | {"velocity": [2, 0, 0, 0, turning, 0]}, gravity=G, floor=0.0,
                             contact={"restitution": 0.0, "friction": 0.2}),
-                   RigidConstraints(friction="coulomb"), steps=2000)  # fmt: skip
+                   RigidConstraints(friction="coulomb"), steps=1000)  # fmt: skip
     slid = (2.0 - 2.0 * share) ** 2 / (2.0 * 0.2 * G)
     short = 0.5e-3 * (2.0 - 2.0 * share)
-    assert run.q[-1, :3] == pytest.approx([2.0 * share * 2.0 + slid - short, 0.0, RADIUS], abs=1e-9 + 0.02 * short)
+    assert run.q[-1, :3] == pytest.approx([2.0 * share + slid - short, 0.0, RADIUS], abs=1e-9 + 0.02 * short)
     assert np.linalg.norm(run.v[-1, :3]) == pytest.approx(2.0 * share, rel=1e-9)
     assert np.linalg.norm(run.v[-1, 3:]) * RADIUS == pytest.approx(2.0 * share, rel=1e-9)
 

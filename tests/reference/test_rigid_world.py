@@ -368,21 +368,6 @@ def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name: str) -> Non
     assert world.coupling_in(PEG.with_values({"couplings": {}})).name == "none"
 
 
-def test_a_box_on_a_slope_slides_in_the_world_without_friction_and_sticks_in_the_one_with_it() -> None:
-    sin, cos, box = np.sin(np.pi / 9.0), np.cos(np.pi / 9.0), {"kind": "box", "size": [0.1, 0.1]}
-    slope = scene_of(
-        {"inertia": 1.0 / 600.0, "shapes": [box], "position": [0.05 * sin, 0.05 * cos, -np.pi / 9.0]}, space=False,
-        gravity=9.81, rate=500.0, duration=0.2, contact={"friction": 0.5},
-        walls=[{"name": "slope", "kind": "half_plane", "point": [0.0, 0.0], "normal": [sin, cos]}])  # fmt: skip
-    ice = slope.with_values({"bodies.body_0.friction": 0.0})
-    assert run_world(ice, "ideal-friction").q[-1, :2] == pytest.approx(run_world(ice, "ideal").q[-1, :2], abs=1e-12)
-    slid = {name: float(np.diff(run_world(slope, name).q[[0, -1], :2], axis=0)[0] @ [cos, -sin])
-            for name in ("ideal", "ideal-friction")}  # fmt: skip
-    # The step is a hundredth of 0.2 s, and the law is of first order.
-    assert slid["ideal"] == pytest.approx(0.5 * 9.81 * sin * 0.2**2, rel=0.02)
-    assert abs(slid["ideal-friction"]) < 1e-9
-
-
 @pytest.mark.parametrize(("call", "says"), [
     (lambda: run_world("peg_cornre", "PB"), "peg_corner"),
     (lambda: find_world("CBuc").coupling_in(PEG.with_values({"couplings.unilateral": None})), "gives no gains"),
