@@ -54,17 +54,6 @@ def test_another_resolver_or_tolerance_has_another_folder_and_a_file_that_is_not
     assert replace(SOUND, workers=2, impacts=7).key() == SOUND.key()
 
 
-def test_a_broken_law_leaves_files_that_still_show_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    campaign = Campaign(tmp_path, BROKEN)
-    campaign.run(BATCHES[:1], _silent)
-    kept = [path for path in campaign.counterexamples() if "kinetic_energy" in path.name]
-    assert kept and any(path.with_suffix(".hdf5").is_file() for path in kept)
-    [(law, residual)] = recheck(kept[0], allow_code=True)
-    assert law == "kinetic_energy" and not residual.passed
-    assert main(["verify", "--recheck", str(kept[0]), "--allow-code"]) == 1
-    assert "BROKEN kinetic_energy" in capsys.readouterr().out
-
-
 def test_a_file_that_names_a_module_does_not_run_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,7 +24,7 @@ from reports.live.replay import read_live, replay
 from reports.store.keys import content_hash
 from reports.store.runs import read_run
 from verification.cost.impacts import Choice
-from verification.finding import REPRODUCED, Finding, Part
+from verification.finding import REPRODUCED, Failure, Finding, Part, with_failures
 from verification.proofs.coq_development import Theorem
 from verification.table import Column, Table, titled
 
@@ -33,6 +33,7 @@ SLOPE = ROOT / "tests" / "verification" / "worlds" / "slope.yaml"
 HEAVY = {"numpy", "numba", "cvxpy", "pinocchio", "sympy", "matplotlib", "h5py", "scipy", "coal", "flint", "hypothesis"}
 SHORT = ("peg_corner", "--set", "duration=0.4")
 STUDY = "name: two\ntitle: Two\nscene: two_discs\nworlds: [IAPB]\ngrid:\n  contact.restitution: [0.0, 0.5]\n"
+FAILED = Failure("four contacts", "SolverError", "no solution")
 WRONG_SCENE = """\
 name: wrong
 rate: -5
@@ -84,7 +85,8 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bare").mkdir()
     for name, text in {"wrong.yaml": WRONG_SCENE, "ball.yaml": "", "notes.h5": "not HDF5", "notes.md": "notes",
-                       "text.npz": "no archive", "empty.npz": "", "own_devices.py": DEVICES}.items():  # fmt: skip
+                       "text.npz": "no archive", "empty.npz": "", "own_devices.py": DEVICES, "own_number.py": "f = 3",
+                       "own_syntax.py": "def f(:", "own_fault.py": "f = 1 / 0"}.items():  # fmt: skip
         (tmp_path / name).write_text(text)
     np.savez(tmp_path / "half.npz", v_minus=np.ones((1, 2)))
     (tmp_path / "cut.npz").write_bytes((tmp_path / "half.npz").read_bytes()[:99])
@@ -156,6 +158,8 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "live peg_corner --out /dev/null/folder", "/dev/null/folder: Not a directory"),
     *((1, f"live peg_corner --device {device}", said) for device, said in (
         ("omega", "--device"), ("no_such:connect", "imported"), (":connect", "--device"), ("json:", "--device"),
+        (".relative:f", "--device"), ("'a b:c'", "--device"), ("own_syntax:f", "SyntaxError"),
+        ("own_fault:f", "ZeroDivisionError"), ("own_number:f", "something that can be called"),
         ("own_devices:broken", "no cable"), ("own_devices:mute", "no answer"), ("own_devices:brokn", "broken?"))),
     (1, "live two_discs --device simulated", "a scene with a hand"),
 ]  # fmt: skip
@@ -401,6 +405,9 @@ def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, m
     monkeypatch.setattr("reports.commands.bench.work_precision", lambda **_: Table((Column("y"),), ((2,),)))
     monkeypatch.setattr("reports.commands.bench.choices", lambda _: Table(()))
     status, found = answer("bench")
+    monkeypatch.setattr("reports.commands.bench.haptic_study", lambda *_: with_failures(finding, [FAILED]))
+    assert "Not computed: four contacts: SolverError: no solution" in iapb("bench")[1] and answer("bench")[0] == 1
+    monkeypatch.setattr("reports.commands.bench.haptic_study", lambda *_: finding)
     assert status == 0 and set(found) == listed("bench")
     assert found["tables"] == {"one": [{"x": 1}], "methods on problems": [{"y": 2}]}
     assert "• as asked for: s" in iapb("bench")[1]

@@ -13,9 +13,7 @@ from typing import Any
 
 import pytest
 
-from iapb.errors import MissingDependencyError
 from iapb.scene import find_scene, load_scene
-from reference.simulators import siconos_adapter
 from reports import provenance, report
 from reports.crate import CRATE_NAME, PROFILE, sha256
 from reports.evidence import gather
@@ -130,15 +128,6 @@ def test_paths_of_a_machine_are_cut_from_the_command(word: str, kept: str, monke
     for program in ("/srv/bin/iapb", str(provenance._ROOT / "reports" / "cli.py")):
         monkeypatch.setattr(sys, "argv", [program, "run", word])
         assert provenance.current_command() == f"iapb run {kept}"
-
-
-def test_the_version_of_siconos_is_that_of_its_adapter(monkeypatch: pytest.MonkeyPatch) -> None:
-    def absent(_: object) -> None:
-        raise MissingDependencyError("siconos", "The test", "apt-get")
-
-    for told, shown in ((lambda _: {"version": "4.4.0"}, "4.4.0"), (absent, provenance.NOT_INSTALLED)):
-        monkeypatch.setattr(siconos_adapter, "ask", told)
-        assert provenance.collect_provenance(packages=("siconos",))["siconos"] == shown
 
 
 def test_uncommitted_changes_are_a_patch_with_new_files_until_they_are_committed(

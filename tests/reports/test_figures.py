@@ -21,10 +21,9 @@ from matplotlib.transforms import Bbox
 from iapb.run import Run
 from reports.figures import RECIPES, plot
 from reports.figures.condition_map import condition_map
-from reports.figures.corner import penetration_over_time
 from reports.figures.figure import Figure, Recipe, draw, standalone
 from reports.figures.labels import arrow_of_time, label_marks, name_curves
-from reports.figures.numbers import format_cell, format_number
+from reports.figures.numbers import format_number
 from reports.figures.paper import arm_energies
 from reports.figures.plot import Plot
 from reports.figures.style import CYCLE, LOOKS, STYLES, VARIABLES
@@ -215,14 +214,6 @@ def test_figure_3_has_the_energies_that_follow_from_the_geometry() -> None:
             np.testing.assert_allclose(lost, share * lost[0], atol=1e-13)
 
 
-def test_penetration_is_that_of_the_deepest_contact(gallery: Gallery) -> None:
-    run = gallery.inputs["corner/IAPB"]
-    depth, rows = penetration_over_time(run), run.contacts
-    for k in range(run.steps):
-        gaps = rows.gap[rows.offsets[k] : rows.offsets[k + 1]]
-        assert depth[k] == max(-gaps.min(), 0) if len(gaps) else depth[k] == 0
-
-
 def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes() -> None:
     table = replace(titled(("x", "y"), [(0, 0), (1e-3, 0), (1e-3, 0)]), holds=(True, False, True))
     panel = condition_map("m", "t", "c", table, "x", "y").panels[0]
@@ -236,10 +227,3 @@ def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes() -> None:
 ])
 def test_numbers_for_people(value: float, text: str) -> None:
     assert format_number(value) == text
-
-
-@pytest.mark.parametrize(("value", "text"), [
-    (None, "–"), (True, "yes"), (12345, "12\u202f345"), (np.int64(3), "3"), (np.float64(0.25), "0.2500"), ("x", "x"),
-])
-def test_cells(value: object, text: str) -> None:
-    assert format_cell(value) == text

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.pages.matrix import MARKS, decade, matrices, worst_first
+from reports.pages.matrix import matrices, worst_first
 from reports.pages.records import Evidence
 from reports.runner import Runner
 from tests.reports.joined import joined
@@ -76,13 +76,3 @@ def test_what_we_fail_stands_first_then_the_largest_share_of_what_is_allowed() -
 def test_the_page_says_the_verdict_before_the_decade(cases: tuple[Finding, ...]) -> None:
     page = joined(Evidence(hard_cases=cases, topics=(study.on_hard_cases(cases),)), ())
     assert re.search(r'✕</span> gains energy</span> <span class="decade">10[⁻\d⁰¹²³⁴-⁹]+</span>', page)
-
-
-@pytest.mark.parametrize(("value", "text"), [(2e-16, "10⁻¹⁶"), (0.3, "10⁻¹"), (2.0, "10⁰"), (0.0, ""), (None, "")])
-def test_the_decade_of_a_value(value: float | None, text: str) -> None:
-    assert decade(value) == text
-
-
-def test_verdicts_look_different_and_without_cases_there_is_no_matrix() -> None:
-    assert len({mark for mark, _ in MARKS.values()}) == len(MARKS)
-    assert matrices(Table(summary(()).columns)) == []

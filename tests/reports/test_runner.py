@@ -11,7 +11,6 @@ from reports.evidence import exact_energy
 from reports.runner import Runner
 from reports.store import read_run
 from verification.check import Study
-from verification.complementarity import topic as complementarity
 
 PEG = load_scene(find_scene("peg_corner")).with_values({"duration": 1.2})
 
@@ -81,20 +80,11 @@ def test_runs_are_listed_under_everything_that_used_them(tmp_path, computed):
     assert runner.user == "" and len(inside) == 2 and computed == ["IAPB", "PB"]
 
 
-def test_every_engine_run_used_before_is_certified(tmp_path, monkeypatch):
-    monkeypatch.setattr(exact_energy, "_DRAWN", {"quick": 20})
+def test_every_engine_run_used_before_is_certified(tmp_path):
     runner = Runner(tmp_path)
     run = runner(PEG, "IAPB")
     runner(PEG, "PB")
     with runner.recording("a topic") as inside:
-        found = exact_energy.TOPIC(runner, "quick", lambda done, total: None)
-    table = found.tables["certified runs"]
+        table = exact_energy.TOPIC.checks[0].table(Study(runner))
     assert table.column("impacts") == [len(run.impacts.step)] and len(run.impacts.step) > 0
     assert not inside and len(runner.files) == 2
-
-
-def test_a_run_of_any_world_states_its_contact_law(tmp_path):
-    worlds = complementarity.TOPIC.checks[-1].table(Study(Runner(tmp_path)), ("ideal", "IAPB", "PB"))
-    laws = {row["world"]: row for row in worlds.records()}
-    assert laws["IAPB"]["contact law"] != laws["PB"]["contact law"] != laws["ideal"]["contact law"]
-    assert "rendering" in laws["IAPB"]["its settings"]

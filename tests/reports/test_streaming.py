@@ -70,7 +70,7 @@ def test_a_streamed_run_stopped_or_not_has_the_content_of_one_held_in_memory(
 @pytest.fixture
 def killed(tmp_path: Path) -> tuple[Path, Scene]:
     """The parts that a process leaves which is killed in its fifth chunk, and its scene."""
-    scene = scene_of("peg_corner", 4000)
+    scene = scene_of("peg_corner", 2600)
     process = os.fork()
     if process == 0:
         Runner(tmp_path, lambda done, total: os._exit(9) if done > 2048 else None).stream(scene, "IAPB")

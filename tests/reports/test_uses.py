@@ -9,7 +9,6 @@ import pytest
 from iapb.scene import find_scene, load_scene, scene_names
 from reports import cli
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
-from reports.pages.records import StoredFile, runs_by_user
 from reports.runner import Runner
 from reports.uses import parsed, run_command
 
@@ -48,9 +47,3 @@ def test_every_scene_and_every_run_of_the_figures_has_a_command_and_a_scene_of_o
     [used] = runner.used.values()
     assert used.command == f"iapb store again out/runs/{used.file}"
     assert cli.main(["store", "again", str(tmp_path / used.file)]) == 0
-
-
-def test_runs_stand_under_each_of_their_users():
-    files = [StoredFile(name, f"runs/{name}.h5", "k", "c", "iapb run", 10, users, status)
-             for name, users, status in (("a", ("C07", "C10"), "complete"), ("b", ("C10",), "absent"), ("t", (), ""))]
-    assert runs_by_user(files) == {"C07": files[:1], "C10": files[:2]}

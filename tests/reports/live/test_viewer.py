@@ -93,9 +93,11 @@ def test_a_viser_that_starts_its_server_in_another_way_is_refused():
         pass
 
 
-@pytest.mark.parametrize("nonsense", [(np.inf, 0.0, 0.0), (np.nan, 0.0, 0.0), (1e308, 0.0, 0.0), (1.0, 2.0), "far",
-                                      None, (1.0, None, 2.0), {"x": 1.0}, {"x": 1.0, "y": 0.0, "z": 0.0}], ids=str)
-def test_a_client_that_sends_nonsense_lets_go_and_ends_neither_viewer_nor_hand(viewer, nonsense):
+NONSENSE = [(np.inf, 0.0, 0.0), (np.nan, 0.0, 0.0), (1e308, 0.0, 0.0), (1.0, 2.0), "far", None, (1.0, None, 2.0),
+            {"x": 1.0}, {"x": 1.0, "y": 0.0, "z": 0.0}]
+
+
+def test_a_client_that_sends_nonsense_lets_go_and_ends_neither_viewer_nor_hand(viewer):
     place, frames = urlsplit(viewer.address), 3 / browser.FRAMES_PER_SECOND
     options = {"origin": f"http://{place.netloc}", "subprotocols": [f"viser-v{viser.__version__}"]}
 
@@ -107,7 +109,7 @@ def test_a_client_that_sends_nonsense_lets_go_and_ends_neither_viewer_nor_hand(v
             assert time.monotonic() < end
             time.sleep(0.02)
 
-    for _ in range(2):
+    for nonsense in NONSENSE:
         with connect(viewer.address.replace("http:", "ws:").rstrip("/"), **options) as socket:
             send((0.01, -0.02, 0.0), held=True)
             send(nonsense, held=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import io
-import platform
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -19,8 +18,7 @@ from hypothesis import strategies as st
 
 from iapb.errors import RunFileError
 from iapb.run import Run
-from reports.provenance import collect_provenance
-from reports.store import content_hash, read_provenance, read_run, write_run
+from reports.store import content_hash, read_run, write_run
 from reports.store.io import sealed
 from reports.store.schema import FORMAT_VERSION
 
@@ -98,7 +96,7 @@ def test_xarray_opens_it_with_units_and_dimensions_and_numbers_are_checksummed(
         file.visititems(check)
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.floats(0, 1, exclude_max=True), flip=st.integers(0, 255))
 def test_a_file_with_a_damaged_byte_or_cut_short_is_refused_by_name(
     tmp_path: Path, make_run: MakeRun, place: float, flip: int
@@ -151,16 +149,6 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "other.h5").write_bytes(sealed((tmp_path / "other.h5").read_bytes()))
     with pytest.raises(RunFileError, match="expected 'iapb run'"):
         read_run(tmp_path / "other.h5")
-
-
-def test_provenance_is_complete_and_names_no_machine(tmp_path: Path, make_run: MakeRun) -> None:
-    facts = collect_provenance(seeds=(3, 4))
-    assert read_provenance(write_run(tmp_path / "run.h5", make_run(), provenance=facts)) == facts
-    for name in ("version", "commit", "dirty", "lock", "cpu", "blas", "numba", "seeds", "command"):
-        assert facts[name]
-    text = " ".join(facts.values())
-    assert str(Path(__file__).parents[3]) not in text and str(Path.home()) not in text
-    assert platform.node() == "" or platform.node() not in text.split()
 
 
 @pytest.mark.parametrize("wrong", [
