@@ -73,11 +73,11 @@ imports: setup ## import-linter: the packages import one way
 
 .PHONY: pytest
 pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
-	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) -q $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q $(PYTEST_ARGS)
 
 .PHONY: deep
 deep: setup ## the test suite with long property searches, and the kit on sound resolvers at 100 seeds (hours)
-	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) -q $(PYTEST_ARGS)
+	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q $(PYTEST_ARGS)
 
 .PHONY: format
 format: setup ## let ruff repair what it can
