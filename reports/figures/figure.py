@@ -182,8 +182,8 @@ def standalone(figure: Figure) -> str:
         place = f'<svg x="{x:g}" y="{_LABEL:g}" width="{width:g}" height="{height:g}"'
         parts.append(panel.svg.replace("<svg", place, 1))
         x, tallest = x + width + _GAP, max(tallest, height)
-    whole, below = x, tallest + _LABEL + _GAP + 0.5 * _LEGEND
     steps = [66 + _LETTER * len(text) for text, _ in figure.legend]
+    whole, below = max(x, sum(steps) + 2 * _GAP), tallest + _LABEL + _GAP + 0.5 * _LEGEND
     x = (whole - sum(steps)) / 2
     for (text, look), step in zip(figure.legend, steps, strict=True):
         parts.append(str(swatch(look)).replace("<svg", f'<svg x="{x:g}" y="{below - 11:g}" width="36" height="14"', 1))
