@@ -107,6 +107,8 @@ class Certificate:
         return (f"{energy} (exact).{springs} Certified: {'; '.join(held) or 'nothing'}.{fits} "
                 f"Not judged: {'; '.join([*open_, 'forces between impacts'])}.")
 
+    __str__ = words
+
 
 def exact_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Fraction:
     """KE⁺ − KE⁻ = ½ (v⁺ᵀMv⁺ − v⁻ᵀMv⁻) as a rational number."""

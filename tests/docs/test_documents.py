@@ -76,9 +76,11 @@ def test_example(path: Path, tmp_path: Path) -> None:
     assert done.returncode == 0 and done.stdout.strip(), done.stdout + done.stderr
 
 
-def test_the_picture_of_the_readme_shows_the_runs_of_today(tmp_path: Path) -> None:
-    """What it says of itself in words and numbers: how far each world ends from the ideal one."""
-    assert main(["reproduce", "--figure", "hero", "--out", str(tmp_path)]) == 0
+@pytest.mark.parametrize(("figure", "name"), [("hero", "peg_in_the_corner"), ("fig01", "impulses_and_forces"),
+                                              ("fig05", "couplings"), ("scenes", "scenes")])  # fmt: skip
+def test_pictures_show_the_runs_of_today(figure: str, name: str, tmp_path: Path) -> None:
+    """What they say of themselves in words and numbers, such as how far each world ends from the ideal one."""
+    assert main(["reproduce", "--figure", figure, "--out", str(tmp_path)]) == 0
     drawn, kept = (re.findall(r"<desc>(.*?)</desc>", path.read_text(encoding="utf-8"), flags=re.S)[0] for path in
-                   (tmp_path / "hero.svg", ROOT / "docs/pictures/peg_in_the_corner.svg"))  # fmt: skip
-    assert not differs(drawn, kept), "draw it again: iapb reproduce --figure hero"
+                   (tmp_path / f"{figure}.svg", ROOT / f"docs/pictures/{name}.svg"))  # fmt: skip
+    assert not differs(drawn, kept), f"draw it again: iapb reproduce --figure {figure}"
