@@ -30,7 +30,6 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Finding, ...]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("verification.hard_cases.shared_problems.FOLDER", Path("nowhere"))
         chosen = {name: catalogue.HARD_CASES[name] for name in (*CHOSEN, "bowl_of_low_rank")}
-        patch.setattr("verification.hard_cases.judge.HARD_CASES", chosen)
         patch.setattr("verification.hard_cases.study.HARD_CASES", chosen)
         runner = Runner(tmp_path_factory.mktemp("runs"))
         found = study.hard_cases(runner, lambda done, total: None, [])
