@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.plot import Plot
+from reports.figures.plot import Plot, note
 from reports.figures.style import (
     BLUE,
     BOUND,
@@ -82,32 +82,33 @@ _COUNTS = (5, 10, 20, 50, 100, 200)  # ticks
 
 @recipe("where-to-stop", "complementarity/piles")
 def where_to_stop(numbers: Table) -> Drawn:
-    """Draw over the contacts how often (19) is right, how many impulses pull, and the time of impulses that push."""
-    rows = [row | {"right": 100.0 * row["share that agrees"], "pull": 100.0 * row["share of impulses that pull"],
-                   "price": row["time of pushing"] / row["time of (21)"]} for row in numbers.records()]  # fmt: skip
+    """Draw over the contacts how often (19) is right, and how many of its impulses pull."""
+    rows = numbers.records()
     looks = looks_of(f"(19) for {given} contacts" for given in numbers.column("rows"))
     limit = max(row["most contacts that agree"] for row in rows)
-    least, most = (f"{end(row['price'] for row in rows):.2g}" for end in (min, max))
-    panels = []
-    for y, alt, label, axis in (
-        ("right", f"No pile of more than {limit} contacts agrees.", "how often (19) agrees with complementarity",
-         "piles that agree [%]"),
-        ("pull", "Share of impulses that pull over contacts.", "impulses of (19) that pull", "impulses that pull [%]"),
-        ("price", f"Pushing takes {least} to {most} times as long as (21).", "price of impulses that only push",
-         "time, pushing over (21)"),
+    wrong = min(row["contacts"] for row in rows if row["share that agrees"] < 1.0)
+    prices = [row["time of pushing"] / row["time of (21)"] for row in rows]
+    panels = list[Panel]()
+    for key, alt, label, axis in (
+        ("share that agrees", f"No pile of more than {limit} contacts agrees.",
+         "how often (19) agrees with complementarity", "piles that agree [%]"),
+        ("share of impulses that pull", "Share of impulses that pull over contacts.", "impulses of (19) that pull",
+         "impulses that pull [%]"),
     ):  # fmt: skip
-        with Plot(f"where-to-stop-{y}") as plot:
+        with Plot(f"where-to-stop-{key.split()[-1]}") as plot:
             for name, look in looks.items():
-                plot.marks([(row["contacts"], row[y]) for row in rows if f" {row['rows']} " in name], look)
-            if y == "price":
-                plot.axes.axhline(1.0, **line_arguments(BOUND, marked=False))
-            lowest = -4.0 if y == "right" else 0.0
-            plot.axes.set(xlabel="contacts at once", ylabel=axis, xscale="log", ylim=(lowest, None))
+                plot.marks([(row["contacts"], 100.0 * row[key]) for row in rows if f" {row['rows']} " in name], look)
+            plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
+            words = f"{limit}: the largest that ever agreed" if not panels else ""
+            note(plot.axes, (limit, 0.97), words, (4, 0), ha="left", va="top",
+                 xycoords=plot.axes.get_xaxis_transform())  # fmt: skip
+            plot.axes.set(xlabel="contacts at once", ylabel=axis, xscale="log", ylim=(-4.0, None))
             plot.axes.set_xticks(_COUNTS, [str(count) for count in _COUNTS])
             plot.axes.minorticks_off()
         panels.append(Panel(plot.svg, alt, label))
-    pushed = max(row["pushing from the LCP"] for row in rows)
-    return Drawn(panels, numbers, looks, {"limit": limit, "pushed": pushed, "least": least, "most": most})
+    return Drawn(panels, numbers, looks, {
+        "limit": limit, "wrong": f"{wrong:.0f}", "pushed": max(row["pushing from the LCP"] for row in rows),
+        "least": f"{min(prices):.2g}", "most": f"{max(prices):.2g}"})  # fmt: skip
 
 
 # At most six curves; the table has all solvers. In the table, "IAPB" is the engine called from Python.

@@ -7,8 +7,7 @@ in the paper's Figure 4. Lengths are in metres and angles in radians, unless a n
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,9 @@ from reports.figures.geometry import body_outlines
 from reports.figures.labels import arrow_of_time
 from reports.figures.plot import PATH, TIME, Canvas, Plot
 from reports.figures.style import MUTED, PANEL, STYLES, line_arguments
-from verification.table import Table, titled
+from verification.scenes import measures
+from verification.scenes.measures import Trace
+from verification.table import titled
 
 Floats = NDArray[np.float64]
 
@@ -36,18 +37,26 @@ DEVICE = {"IAPB": "device/IAPB", "IAPB LM": "device/IAPB-LM", "PB": "device/PB"}
 MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
-_AT_CONTACT = (0.01, 0.14)  # [s] before and after the first contact: the impulses of all worlds, separately visible
+_AT_CONTACT = (-0.01, 0.14)  # [s] from the first contact: the impulses of all worlds, separately visible
 _LAST_PART = 0.2  # of the run: long after the last impact of any world, the mean is the balance of forces
 _MARKS = 9  # markers along a curve: enough to identify it in grey print, few enough to see the line
-_PRINTED_RANGE = (-2.5, 0.05)  # ticks of Figure 7 that the paper's text keeps; a line of room for curves at 0
-# A peg slower than this (and turning slower than this) counts as settled: a tenth of its speed at contact, where
-# the eye no longer sees it move [m/s], [rad/s].
-SETTLED_SPEED = np.array([1e-3, 1e-3, 1e-2])
+_APART = 0.05  # share of the largest distance between curves at which they are seen to part, and to stay at rest
+_LEAD = 5  # steps before the curves part that are shown
+_NEAR, _SMALL = 11, 0.1  # a pulse has no counterpart if none of this share of it is within so many steps around it
+# Forces that are drawn: coordinate, title, name, unit, and the range between the impulses
+_DRAWN = ((0, "force along x", "Fx", "N", (-0.4, 1.5)), (2, "torque", "τ", "N m", (-0.03, 0.03)))
+# What is measured, and its column in the tables
+_DISTANCES = {"x": "distance from ideal: x [mm]", "y": "y [mm]", "angle": "θ [°]"}
+_MOTION = {"depth": "penetration [mm]", "apart": "tool–device [mm]", "impacts": "impacts", "settled": "settled at [s]"}
+_FORCES = {"Fx": "peak |Fx| [N]", "Fy": "peak |Fy| [N]", "torque": "peak |τ| [N m]", "held Fx": "held Fx [N]",
+           "held Fy": "held Fy [N]", "held torque": "held τ [N m]"}  # fmt: skip
 _FROM_IDEAL = "Distances from the ideal trajectory are root mean squares over the whole run, on the device side. "
 _SETTLED = "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
 _HELD = ("Held: mean over the last fifth of the run. The hand pushes with Fx = −0.32 N, Fy = 0.4 N, so a world in "
          "balance holds 0.32 and −0.4 N.")  # fmt: skip
 _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
+
+Traces = Mapping[str, Trace]
 
 
 def _recipe(number: int, runs: Mapping[str, str], forces: bool) -> Recipe:
@@ -56,10 +65,56 @@ def _recipe(number: int, runs: Mapping[str, str], forces: bool) -> Recipe:
 
     def draw(*given: Run) -> Drawn:
         named = dict(zip(runs, given, strict=True))
-        panels, numbers = _forces(key, named) if forces else _trajectories(key, named, runs)
-        return Drawn(panels, numbers, {curve: STYLES[curve] for curve in runs})
+        traces = {curve: measures.trace_of(run) for curve, run in named.items()}
+        measured = {curve: _measured(trace, traces.get("ideal")) for curve, trace in traces.items()}
+        told: dict[str, Any] = {**measured, "tilt": DEGREES * next(iter(traces.values())).device[0, 2]}
+        panels, shown, note = ((_forces(key, traces), _FORCES, _HELD) if forces else
+                               (_trajectories(key, named, traces), _MOTION, _SETTLED))
+        if forces and "ideal" in runs:
+            told["lone"] = _lone_pulse(named["IAPB"], traces)
+        elif "ideal" in runs:
+            shown, note = _DISTANCES | shown, _FROM_IDEAL + note
+            told |= {name: ", ".join(sorted(measured.keys() - {"ideal"}, key=lambda curve: measured[curve][name]))
+                     for name in ("distance", "angle")}  # fmt: skip
+        rows = tuple((curve, *(each[name] for name in shown)) for curve, each in measured.items())
+        return Drawn(panels, titled(("world", *shown.values()), rows, digits=3, note=note),
+                     {curve: STYLES[curve] for curve in runs}, told)  # fmt: skip
 
     return recipe(key, *runs.values())(draw)
+
+
+def _measured(trace: Trace, ideal: Trace | None) -> dict[str, Any]:
+    """Return the numbers of one curve, by the names that tables and texts use: [mm], [°], [s], [N] and [N m]."""
+    force, state, peaks = trace.device_force, measures.settled_at(trace), measures.peak_force(trace)
+    held = force[-max(int(_LAST_PART * len(force)), 1) :].mean(axis=0)
+    settled = float(trace.time[state]) if state < len(trace.time) else None
+    pulse = [f"{each:.1f}" for each in np.abs(force[:, 0]) if each > _SMALL * peaks[0]]
+    found = {
+        "depth": round(MILLI * measures.deepest_penetration(trace), _DIGITS),
+        "apart": round(MILLI * float(np.hypot(*measures.largest_separation(trace)[:2])), _DIGITS),
+        "impacts": len(trace.impact_step), "bounces": measures.bounces(trace), "settled": settled,
+        "rests": "never in the run" if settled is None else f"at {settled:.2f} s", "steps": len(pulse),
+        "pulse": " and ".join(pulse), **dict(zip(_FORCES, (*peaks.tolist(), *held.tolist()), strict=True)),
+    }  # fmt: skip
+    if ideal is not None:
+        x, y, angle = measures.root_mean_square(trace, ideal, slice(None)).tolist()
+        past = np.hypot(*(trace.device[-1] - ideal.device[-1])[:2])
+        found |= {"x": MILLI * x, "y": MILLI * y, "angle": DEGREES * angle, "distance": MILLI * np.hypot(x, y),
+                  "past": MILLI * past}  # fmt: skip
+    return found
+
+
+def _lone_pulse(run: Run, traces: Traces) -> dict[str, float]:
+    """Return the largest torque of IAPB [N m] in a step around which ideal has none, its time, and its strongest pull.
+
+    A pull is an impulse [N s] against the normal of its contact.
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    ours, theirs = (np.abs(traces[name].device_force[:, 2]) for name in ("IAPB", "ideal"))
+    step = int(np.argmax(np.where(maximum_filter1d(theirs, _NEAR) < _SMALL * ours, ours, 0.0)))
+    impulses = run.contacts.impulse[slice(*run.contacts.offsets[step : step + 2])]
+    return {"torque": ours[step], "time": run.time[step], "pull": -impulses.min(initial=0.0)}
 
 
 def _marks(count: int, number: int) -> tuple[int, int]:
@@ -68,56 +123,56 @@ def _marks(count: int, number: int) -> tuple[int, int]:
     return (number * every // 5) % every, every
 
 
-def _first_shown(runs: Mapping[str, Run], before: float) -> int:
-    """Return the step `before` [s] the first contact of any run; up to that contact all paths are the same line."""
+def _first_shown(runs: Mapping[str, Run]) -> int:
+    """Return the first step of the paths; up to the first contact of any run all paths are the same line."""
     touching = [int(np.flatnonzero(np.diff(run.contacts.offsets))[0]) for run in runs.values() if len(run.contacts.gap)]
-    return max(min(touching) - round(before / next(iter(runs.values())).dt), 0) if touching else 0
+    return max(min(touching) - round(_BEFORE_CONTACT / next(iter(runs.values())).dt), 0) if touching else 0
 
 
-def _trajectories(key: str, runs: Mapping[str, Run], names: Mapping[str, str]) -> tuple[list[Panel], Table]:
-    """Draw the path and the three coordinates; for limited devices, also tool against device and penetration."""
-    over = partial(_over_time, key, runs)
-    ends = "; ".join("{} ends at ({:.1f}, {:.1f})".format(curve, *(MILLI * run.device_q[-1, :2]))
-                     for curve, run in runs.items())  # fmt: skip
+def _trajectories(key: str, runs: Mapping[str, Run], traces: Traces) -> list[Panel]:
+    """Draw the path and, from where the curves part, the three coordinates and the distances from ideal.
+
+    If a device is limited, also draw how far tool and device come apart, and the penetration.
+    """
+    def over(suffix: str, values: Mapping[str, Floats], axis: str, label: str) -> Panel:
+        return _over_time(f"{key}-{suffix}", traces, values, axis, label, *_seen_apart([*values.values()]))
+
+    ends = "; ".join("{} ends at ({:.1f}, {:.1f})".format(curve, *(MILLI * trace.device[-1, :2]))
+                     for curve, trace in traces.items())  # fmt: skip
     panels = [Panel(_path(f"{key}-path", runs), f"Paths of the hand in the plane, in mm: {ends}.",
                     "path of the hand, from just before contact")]  # fmt: skip
     for k, (name, unit, factor) in enumerate(_COORDINATES):
-        values = {curve: factor * run.device_q[:, k] for curve, run in runs.items()}
-        panels.append(over("xyz"[k], values, f"{name} [{unit}]", f"{name} over time"))
-    if "ideal" in runs:
-        ideal = runs["ideal"].device_q
-        off = {curve: _apart(run.device_q, ideal) for curve, run in runs.items() if curve != "ideal"}
+        values = {curve: factor * trace.device[:, k] for curve, trace in traces.items()}
+        panels.append(over("xyz"[k], values, f"{name} [{unit}]", f"{name}, from where the curves part"))
+    if "ideal" in traces:
+        off = {curve: trace.device - traces["ideal"].device for curve, trace in traces.items() if curve != "ideal"}
         panels += [over("off-position", {curve: MILLI * np.hypot(*path[:, :2].T) for curve, path in off.items()},
-                        "distance from ideal [mm]", "deviation from ideal, position"),
+                        "distance from ideal [mm]", "distance from ideal, position"),
                    over("off-angle", {curve: DEGREES * np.abs(path[:, 2]) for curve, path in off.items()},
-                        "angle from ideal [°]", "deviation from ideal, angle")]  # fmt: skip
-    if names == UNLIMITED:  # beyond the final position in the ideal world, on the axis of the printed Figure 7
-        values = {curve: MILLI * (runs["ideal"].device_q[-1, 1] - run.device_q[:, 1]) for curve, run in runs.items()}
-        panels.append(over("printed", values, "past the rigid place [mm]",
-                           "depth along y past the rigid place, on the printed range", height=_PRINTED_RANGE))
-    if names in (LIMITED, STRATEGIES):
-        apart = {curve: MILLI * np.hypot(*(tool_positions(run)[:, :2] - run.device_q[:, :2]).T)
-                 for curve, run in runs.items()}  # fmt: skip
-        depths = {curve: MILLI * penetration_over_time(run) for curve, run in runs.items()}
+                        "angle from ideal [°]", "distance from ideal, angle")]  # fmt: skip
+    if "ideal" in traces and any(np.any(trace.impact_scale < 1.0) for trace in traces.values()):
+        apart = {curve: MILLI * np.hypot(*(trace.tool - trace.device)[:, :2].T) for curve, trace in traces.items()}
+        depths = {curve: MILLI * trace.penetration for curve, trace in traces.items()}
         panels += [over("apart", apart, "distance [mm]", "how far tool and device come apart"),
                    over("depth", depths, "penetration [mm]", "how deep the virtual peg sinks in")]
-    reference = "ideal" if "ideal" in runs else None
-    distances = ("distance from ideal: x [mm]", "y [mm]", "θ [°]") if reference else ()
-    columns = ("world", *distances, "penetration [mm]", "tool–device [mm]", "impacts", "settled at [s]")
-    note = _FROM_IDEAL + _SETTLED if reference else _SETTLED
-    return panels, titled(columns, tuple(_row(curve, runs, reference) for curve in runs), digits=3, note=note)
+    return panels
 
 
-def _apart(path: Floats, other: Floats) -> Floats:
-    """Return the difference of two paths over the time of the shorter one."""
-    return path[: len(other)] - other[: len(path)]
+def _seen_apart(values: Sequence[Floats]) -> tuple[int, int]:
+    """Return the steps just before the curves part, and when all are at rest."""
+    every = np.array(values)
+    spread = np.ptp(every, axis=0)
+    seen = _APART * spread.max()
+    parted = int(np.argmax(spread > seen))
+    rest = np.flatnonzero((np.abs(every - every[:, -1:]) > seen).any(axis=0)).max(initial=parted)
+    return max(parted - _LEAD, 0), int(rest) + int(rest - parted) // 10 + 2
 
 
 def _path(key: str, runs: Mapping[str, Run], size: tuple[float, float] = PANEL, *, equal: bool = False) -> str:
     """Draw y against x of the device, from shortly before the first contact."""
     with Plot(key, size, kind="" if equal else PATH) as plot:
         for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[_first_shown(runs, _BEFORE_CONTACT) :, :2].T
+            x, y = MILLI * run.device_q[_first_shown(runs) :, :2].T
             plot.axes.plot(x, y, **line_arguments(STYLES[curve]), markevery=_marks(len(x), number),
                            zorder=3 + number / 10)
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
@@ -129,78 +184,34 @@ def _path(key: str, runs: Mapping[str, Run], size: tuple[float, float] = PANEL, 
     return plot.svg
 
 
-def _over_time(key: str, runs: Mapping[str, Run], suffix: str, values: Mapping[str, Floats], axis: str, label: str, *,
-               height: tuple[float, float] | None = None, first: int = 0, last: int | None = None,
-               **how: Any) -> Panel:  # fmt: skip
+def _over_time(key: str, traces: Traces, values: Mapping[str, Floats], axis: str, label: str, first: int, last: int,
+               height: tuple[float, float] | None = None, **how: Any) -> Panel:  # fmt: skip
     """Draw a quantity of each run over time, from step `first` to step `last`; `height` limits the vertical axis."""
-    with Plot(f"{key}-{suffix}", kind=TIME) as plot:
+    time = next(iter(traces.values())).time[first:last]
+    with Plot(key, kind=TIME) as plot:
         for number, (curve, whole) in enumerate(values.items()):
-            shown, run = whole[first:last], runs[curve]
-            plot.axes.plot(run.time[first : first + len(shown)], shown, **line_arguments(STYLES[curve]), **how,
+            shown = whole[first:last]
+            plot.axes.plot(time[: len(shown)], shown, **line_arguments(STYLES[curve]), **how,
                            markevery=_marks(len(shown), number), zorder=3 + number / 10)
-        longest = max((runs[curve] for curve in values), key=lambda run: run.steps)
-        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=(longest.time[first], longest.time[: last][-1]), ylim=height)
+        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=time[[0, -1]], ylim=height)
     ranges = ", ".join(f"{curve} {min(each):.3g} to {max(each):.3g}" for curve, each in values.items())
     return Panel(plot.svg, f"{axis} over time, in the whole run: {ranges}.", label)
 
 
-def tool_positions(run: Run) -> Floats:
-    """Return the tool's coordinates (n + 1, d_t); its joints must have as many velocities as coordinates."""
-    return run.q[:, slice(*run.tool_coordinates)]
+def _forces(key: str, traces: Traces) -> list[Panel]:
+    """Draw force along x and torque at the first contact, and magnified around the holding force.
 
-
-def penetration_over_time(run: Run) -> Floats:
-    """Return the deepest penetration of each step (n,) [m], 0 without contact."""
-    depth = np.zeros(run.steps)
-    steps = np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
-    np.maximum.at(depth, steps, -run.contacts.gap)
-    return depth
-
-
-def settling_time(run: Run) -> float | None:
-    """Return the time [s] from which the device stays slower than SETTLED_SPEED; None if it moves until the end."""
-    moving = np.flatnonzero(np.any(np.abs(run.device_v) > SETTLED_SPEED[: run.device_v.shape[1]], axis=1))
-    if not len(moving):
-        return 0.0
-    return None if moving[-1] == len(run.time) - 1 else float(run.time[moving[-1] + 1])
-
-
-def _row(curve: str, runs: Mapping[str, Run], reference: str | None) -> tuple[object, ...]:
-    run = runs[curve]
-    apart: tuple[float, ...] = ()
-    if reference:  # root mean square over the whole run
-        off = np.sqrt(np.mean(_apart(run.device_q, runs[reference].device_q) ** 2, axis=0))
-        apart = tuple(float(off[k] * factor) for k, (_, _, factor) in enumerate(_COORDINATES))
-    widest = np.max(np.abs(tool_positions(run) - run.device_q), axis=0)
-    lengths = (float(penetration_over_time(run).max(initial=0.0)), float(np.hypot(*widest[:2])))
-    return (curve, *apart, *(round(MILLI * length, _DIGITS) for length in lengths), len(run.impacts.step),
-            settling_time(run))
-
-
-def _forces(key: str, runs: Mapping[str, Run]) -> tuple[list[Panel], Table]:
-    """Draw force along x and torque at the first contact, over the whole run, and magnified around the holding force.
-
-    The force of an impact in one step is hundreds of times the holding force afterwards. The table has the peak forces
-    and the forces held at the end.
+    The force of an impact in one step is hundreds of times the holding force afterwards.
     """
-    start, span = _first_shown(runs, _AT_CONTACT[0]), sum(_AT_CONTACT)
-    contact = {"first": start, "last": start + round(span / next(iter(runs.values())).dt)}
-    panels = []
-    for k, title, name, unit, cut in ((0, "force along x", "Fx", "N", 1.5), (2, "torque", "τ", "N m", 0.03)):
-        views: dict[str, dict[str, Any]] = {
-            f"at the first contact: {span:g} s": contact, "the whole run": {},
-            f"between impulses: cut at ±{cut:g} {unit}": {"height": (-cut, cut)},
-        }  # fmt: skip
-        values = {curve: run.device_force[:, k] for curve, run in runs.items()}
-        for letter, (view, shown) in zip("cam", views.items(), strict=True):
-            panels.append(_over_time(key, runs, f"{k}{letter}", values, f"{name} [{unit}]", f"{title}, {view}",
-                                     drawstyle="steps-post", **shown))  # fmt: skip
-    columns = ("world", "peak |Fx| [N]", "peak |Fy| [N]", "peak |τ| [N m]", "held Fx [N]", "held Fy [N]",
-               "held τ [N m]")
-    rows = tuple((curve, *np.max(np.abs(run.device_force), axis=0, initial=0.0).tolist(),
-                  *run.device_force[-max(int(_LAST_PART * run.steps), 1) :].mean(axis=0).tolist())
-                 for curve, run in runs.items())  # fmt: skip
-    return panels, titled(columns, rows, digits=3, note=_HELD)
+    window, panels = measures.comparison_window([*traces.values()]), list[Panel]()
+    start, *ends = (window.start + round(seconds / next(iter(traces.values())).dt) for seconds in _AT_CONTACT)
+    for k, title, name, unit, cut in _DRAWN:
+        values = {curve: trace.device_force[:, k] for curve, trace in traces.items()}
+        for suffix, view, last, height in (("c", f"at the first contacts: {np.ptp(_AT_CONTACT):.2g} s", ends[0], None),
+                                           ("m", "until all are at rest, pulses cut off", window.stop, cut)):
+            panels.append(_over_time(f"{key}-{k}{suffix}", traces, values, f"{name} [{unit}]", f"{title}, {view}",
+                                     max(start, 0), last, height, drawstyle="steps-post"))  # fmt: skip
+    return panels
 
 
 RECIPES = tuple(_recipe(number, runs, forces) for number, runs, forces in (

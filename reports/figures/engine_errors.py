@@ -1,70 +1,62 @@
-"""Tables of coloured cells by engine and scene: energy error, momentum error and overlap."""
+"""Energy error, momentum error and overlap of each engine, scene by scene."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import log10
+from dataclasses import replace
 from typing import Any
 
-from markupsafe import Markup
-
-from reports.figures.figure import Drawn, Panel, cell, grid, recipe
-from reports.figures.numbers import MINUS
-from reports.figures.style import AMBER, BLUE, RULE, SKY, VERMILION, LineStyle
+from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.plot import Plot
+from reports.figures.style import STYLES, LineStyle, looks_of
 from verification.table import Table
 
 Row = Mapping[str, Any]
 
-LEVELS = {"to 10⁻⁶": (1e-6, BLUE, 0.75), "to 10⁻²": (1e-2, SKY, 0.55), "to 10⁻¹": (1e-1, AMBER, 0.6),
-          "above": (float("inf"), VERMILION, 0.75)}  # fmt: skip
-ROUNDING = 1e-15
-_PANELS = (("energy error", "energy error"), ("momentum error", "momentum error"), ("overlap / size", "overlap"))
+ROUNDING = 1e-16  # smaller errors are drawn here
+_PANELS = (("energy error", "error of the energy"), ("momentum error", "error of the momentum"),
+           ("overlap / size", "deepest overlap, of the size"))  # fmt: skip
+_OURS = {"iapb (ours)": STYLES["IAPB"], "ideal world (ours)": replace(STYLES["ideal"], marker="s")}
 
 
 @recipe("engine-errors", "engines/errors")
 def engine_errors(numbers: Table) -> Drawn:
-    """Draw the three tables."""
-    rows = numbers.records()
+    """Draw a panel for each error: a row for each scene, and in it one for each engine that is installed."""
+    rows = [row for row in numbers.records() if row["law"] != "not installed"]
+    engines = dict.fromkeys(row["engine"] for row in rows)
+    absent = dict.fromkeys(name for name in numbers.column("engine") if name not in engines)
+    looks = {name: replace(look, name="", width=0.0)
+             for name, look in {**looks_of(engines), **_OURS}.items() if name in engines}
+    panels = [Panel(_errors(number, rows, column, looks), f"{label} by scene: {', '.join(engines)}.", label)
+              for number, (column, label) in enumerate(_PANELS)]
+    told = f" Not installed: {', '.join(absent)}." if absent else ""
+    return Drawn(panels, numbers, looks, {"absent": told})
+
+
+def _errors(number: int, rows: Sequence[Row], column: str, looks: Mapping[str, LineStyle]) -> str:
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    panels = []
-    for column, label in _PANELS:
-        lines: dict[str, dict[str, Markup]] = {}
-        for row in rows:
-            lines.setdefault(f"{row['engine']}, {_at(row)}", {})[row["scene"]] = _cell(row, _value(row, column))
-        cells = {line: [found.get(scene, cell()) for scene in scenes] for line, found in lines.items()}
-        panels.append(Panel(grid(scenes, cells, "upright"), _words(rows, column), label))
-    return Drawn(panels, numbers, {name: LineStyle(color, "s", (), 0.0) for name, (_, color, _) in LEVELS.items()})
+    with Plot(f"engine-errors-{number}", (4.1, 0.42 * len(scenes) + 0.7)) as plot:
+        for lane, (engine, look) in enumerate(looks.items()):
+            for place, scene in enumerate(scenes):
+                height = place + 0.19 * (lane - (len(looks) - 1) / 2)
+                mine = {row["settings"]: row for row in rows if (row["engine"], row["scene"]) == (engine, scene)}
+                if any(row["law"] == "failed" for row in mine.values()):
+                    plot.axes.plot(0.98, height, "x", color=look.color, transform=plot.axes.get_yaxis_transform())
+                found = [max(value, ROUNDING) for row in mine.values() if (value := _value(row, column)) is not None]
+                if len(set(found)) > 1:
+                    plot.axes.plot(found, [height] * len(found), color=look.color, linewidth=1.0)
+                    plot.marks([(found[-1], height)], replace(look, filled=False), markersize=5)
+                plot.marks([(value, height) for value in found[:1]], look, markersize=5)
+        plot.log("relative error", "", "x", xlim=(ROUNDING / 3.0, 3.0), ylim=(len(scenes) - 0.5, -0.5))
+        plot.axes.set_yticks(range(len(scenes)), scenes)
+        plot.axes.set_yticks([place + 0.5 for place in range(len(scenes) - 1)], minor=True)
+        plot.axes.grid(visible=False, axis="y")
+        plot.axes.grid(visible=True, axis="y", which="minor")
+        plot.axes.tick_params(axis="y", which="both", length=0)
+    return plot.svg
 
 
 def _value(row: Row, column: str) -> float | None:
-    """Return the absolute value of a cell; without an energy error, the largest rise of energy."""
+    """Return the absolute value of an error; without an energy error, the largest rise of energy."""
     value = row["largest rise of energy"] if row[column] is None and column == "energy error" else row[column]
     return None if value is None else abs(value)
-
-
-def _cell(row: Row, value: float | None) -> Markup:
-    if row["law"] == "not installed":
-        return cell(kind="hatched")
-    if row["law"] == "failed":
-        return cell("✕", color=VERMILION)
-    if value is None:
-        return cell(color=RULE, strength=0.35)
-    color, strength = next((color, strength) for most, color, strength in LEVELS.values() if value <= most)
-    return cell("ε" if value < ROUNDING else f"{round(log10(value))}".replace("-", MINUS), "", color, strength)
-
-
-def _at(row: Row) -> str:
-    return "own" if row["settings"] == "own" else "1 ms"
-
-
-def _words(rows: Sequence[Row], column: str) -> str:
-    said = []
-    for engine in dict.fromkeys(row["engine"] for row in rows):
-        mine = [row for row in rows if row["engine"] == engine]
-        known = [(value, row) for row in mine if (value := _value(row, column)) is not None]
-        if known:
-            worst, where = max(known, key=lambda pair: pair[0])
-            said.append(f"{engine} at most {worst:.1e}, in {where['scene']} ({_at(where)})")
-        else:
-            said.append(f"{engine}: none, {mine[0]['law']}")
-    return f"{column.capitalize()}: " + "; ".join(said) + "."

@@ -38,21 +38,20 @@ class Panel:
         return self.svg.startswith("<table")
 
 
-def cell(text: str | Markup = "", note: str = "", color: str = "", strength: float = 0.0, kind: str = "") -> Markup:
+def cell(text: str | Markup, note: str = "", color: str = "", strength: float = 0.0) -> Markup:
     """Return a cell of a table: its text, a smaller note, and a colour of the text or, with a strength, of the cell."""
     look = f"color: {css(color)}" if color else ""
     if strength:
         look = f"background: color-mix(in srgb, {css(color)} {100 * strength:g}%, transparent)"
-    attributes = Markup("").join(Markup(' {}="{}"').format(name, value)
-                                 for name, value in (("class", kind), ("style", look)) if value)
+    style = Markup(' style="{}"').format(look) if look else ""
     small = Markup("<small>{}</small>").format(note) if note else ""
-    return Markup("<td{}>{}{}</td>").format(attributes, text, small)
+    return Markup("<td{}>{}{}</td>").format(style, text, small)
 
 
 def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Markup]], kind: str = "") -> str:
     """Return a table of cells as HTML: a heading for each column and, as text or Markup, for each row.
 
-    kind : "upright" for headings of columns that take less width, "plain" for texts instead of coloured cells
+    kind : "plain" for texts instead of coloured cells
     """
     join = Markup("").join
     head = join(Markup('<th scope="col"><span>{}</span></th>').format(column) for column in columns)
@@ -76,6 +75,7 @@ class Figure:
     """A figure. `number` is its number in the paper ("Figure 7"), or empty for a figure of this project.
 
     inputs : names of the runs and tables it was drawn from; missing : those that it lacks, so that it has no panels
+    said : what the paper says, what we find, what is the same, what differs; claims : the claims that it shows
     """
 
     key: str
@@ -87,6 +87,8 @@ class Figure:
     legend: tuple[tuple[str, LineStyle], ...] = ()
     inputs: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
+    said: tuple[str, ...] = ()
+    claims: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class Recipe:
     section: str = "figures"
 
 
-TEXTS: Mapping[str, Mapping[str, str]] = tomllib.loads(files(__package__).joinpath("figures.toml").read_text("utf-8"))
+TEXTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(files(__package__).joinpath("figures.toml").read_text("utf-8"))
 MADE: dict[str, Recipe] = {}
 
 
@@ -116,9 +118,10 @@ def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
     def made(function: Callable[..., Drawn]) -> Recipe:
         def draw(inputs: Mapping[str, Any]) -> Figure:
             drawn = function(*(inputs[name] for name in needs))
-            caption = " ".join(text["caption"].split()).format(**drawn.told)
+            caption, *said = (" ".join(words.split()).format(**drawn.told)
+                              for words in (text.get("caption", ""), *text.get("said", ())))
             return Figure(key, number, title, caption, tuple(drawn.panels), drawn.numbers,
-                          tuple(dict(drawn.legend).items()), needs)
+                          tuple(dict(drawn.legend).items()), needs, said=tuple(said), claims=text.get("claims", ()))
 
         MADE[key] = Recipe(key, number, title, needs, draw, text.get("section", "figures"))
         return MADE[key]
@@ -141,8 +144,7 @@ _TABLE = (
     "body { font: 14px/1.4 Verdana, sans-serif } table { border-collapse: collapse } th { font-weight: 400 } "
     "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } small { display: block } "
     "th[scope=row], .plain * { text-align: left } .swatch { width: 36px; height: 14px } "
-    ".hatched { background: repeating-linear-gradient(135deg, #ccc 0 1px, transparent 1px 5px) } "
-    "li { list-style: none } .upright thead span { writing-mode: vertical-rl; rotate: 180deg }"
+    "li { list-style: none }"
 )
 _MARKERS = {  # paths around (18, 7)
     "o": "M14.4 7a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0z", "s": "M14.6 3.6h6.8v6.8h-6.8z",

@@ -9,18 +9,18 @@ import numpy as np
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot
-from reports.figures.style import BOUND, FORCE, MUTED, RULE, STYLES, LineStyle
+from reports.figures.style import BOUND, FORCE, LINK, MUTED, STYLES, LineStyle
+from verification.stability.walls import GROWS, SETTLED_SPEED, SETTLES
 from verification.table import Table
 
 _HOLDS = {  # where a wall comes to rest, else what the mass does with impulses -> its mark, in the colour of the world
     "both laws": LineStyle(MUTED, "o", (), 0.0),
     "only impulses": replace(STYLES["impulses"], width=0.0, filled=False, name=""),
     "only penalties": replace(STYLES["penalty"], width=0.0, name=""),
-    "neither, keeps bouncing": LineStyle(RULE, "s", (), 0.0),
+    "neither, keeps bouncing": LineStyle(LINK, "|", (), 0.0, filled=False),
     "neither, moves ever more": LineStyle(FORCE, "X", (), 0.0),
 }
 _LOOP = ("rate", "sensors", "device damping")
-_SETTLES, _GROWS = "+", "x"
 
 
 @recipe("stability-map", "stability/maps", "stability/dampings")
@@ -29,19 +29,19 @@ def stability_map(table: Table, dampings: Table) -> Drawn:
     damping = np.array(dampings.column("damping"))
     panels = [_walls(number, loop, table.where(**dict(zip(_LOOP, loop, strict=True))), damping)
               for number, loop in enumerate(dict.fromkeys(table.select(_LOOP).rows))]  # fmt: skip
-    return Drawn(panels, table, _HOLDS | {"b = KT/2 + B": BOUND})
+    return Drawn(panels, table, _HOLDS | {"b = KT/2 + B": BOUND}, {"rest": 1e3 * SETTLED_SPEED})
 
 
 def _walls(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray) -> Panel:
     rate, sensors, b = loop
     stiffness, bound = np.array(walls.column("stiffness")), np.array(walls.column("passive up to"))
-    theirs, ours = (np.array([[mark == _SETTLES for mark in marks] for marks in walls.column(law)])
+    theirs, ours = (np.array([[mark == SETTLES for mark in marks] for marks in walls.column(law)])
                     for law in ("penalties", "impulses"))  # fmt: skip
-    grows = np.array([[mark == _GROWS for mark in marks] for marks in walls.column("impulses")])
+    grows = np.array([[mark == GROWS for mark in marks] for marks in walls.column("impulses")])
     neither = ~theirs & ~ours
     shown = np.where(damping > 0.0, damping, damping[damping > 0.0].min() / 2.0)  # the row without damping
     K, B = np.meshgrid(stiffness, shown, indexing="ij")
-    with Plot(f"stability-map-{number}", (3.1, 2.5)) as plot:
+    with Plot(f"stability-map-{number}", (3.4, 2.6)) as plot:
         states = (theirs & ours, ours & ~theirs, theirs & ~ours, neither & ~grows, neither & grows)
         for where, look in zip(states, _HOLDS.values(), strict=True):
             plot.marks(zip(K[where], B[where], strict=True), look, markersize=3.6)

@@ -77,6 +77,7 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("MuJoCo",), LineStyle(PURPLE, "^", (6, 1.6, 1.4, 1.6))),
     (("Drake",), LineStyle(AMBER, "v", (1.4, 1.4))),
     (("Bullet",), LineStyle(GREEN, "P", (3, 1.2))),
+    (("Pinocchio",), LineStyle(GREEN, "D")),
     # worlds called from Python, and worlds by another integrator
     (("ideal, Python",), LineStyle(INK, "o", (), 1.6, filled=False)),
     (("IAPB, midpoint",), LineStyle(BLUE, "s", (1.4, 1.4), 1.2)),

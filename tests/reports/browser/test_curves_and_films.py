@@ -27,7 +27,7 @@ TO_THE_END = "(input) => { input.value = input.max; input.dispatchEvent(new Even
 def test_a_world_can_be_hidden_and_shown(desk: Any) -> None:
     button = desk.page.locator("#fig07 .legend button", has_text="PB").filter(has_not_text="IAPB")
     curves = desk.page.locator("#fig07 [data-trace] [data-curve='PB']")
-    assert curves.count() == 7 and curves.first.is_visible()
+    assert curves.count() == 6 and curves.first.is_visible()
     button.click()
     assert button.get_attribute("aria-pressed") == "false"
     assert not any(curve.is_visible() for curve in curves.all())
@@ -49,7 +49,7 @@ def test_the_cursor_reads_the_values_of_the_run(desk: Any, evidence: Evidence) -
     kept = np.ptp(x) * 0.02 / 180
     assert near.min() - kept <= float(rows["ideal"]) <= near.max() + kept
     assert np.ptp(near) < np.ptp(x) / 10  # or the bracket would say nothing
-    assert desk.page.locator("#fig07 .readout:visible").count() == 6  # the panels over time read together
+    assert desk.page.locator("#fig07 .readout:visible").count() == 5  # the panels over time read together
 
 
 def test_a_film_plays_stops_and_shows_the_poses_of_the_run(

@@ -43,6 +43,12 @@ def test_a_stiff_undamped_wall_makes_the_hand_faster_and_a_soft_damped_one_holds
     assert at(Loop(), 1e6, 0.0, law).grown.all() and at(Loop(device_damping=5.0), 1000.0, 50.0, PENALTY).settled.all()
 
 
+def test_stiff_walls_at_1_khz_bounce_on_below_the_speed_of_rest() -> None:
+    """The report explains with this why such walls come to rest with impulses though nothing damps the motion."""
+    short, long = (at(Loop(rate=1000.0, seconds=seconds), 3e5, 0.0, IMPULSES) for seconds in (3.0, 12.0))
+    assert short.settled.all() and long.settled.all() and (long.bounces > 3 * short.bounces).all()
+
+
 def test_a_plastic_impulse_stops_the_mass_on_touching() -> None:
     loop = Loop(push=0.0)
     contact = at(loop, 1000.0, 50.0, IMPULSES)
