@@ -86,7 +86,7 @@ def where_to_stop(numbers: Table) -> Drawn:
     rows = numbers.records()
     looks = looks_of(f"(19) for {given} contacts" for given in numbers.column("rows"))
     limit = max(row["most contacts that agree"] for row in rows)
-    wrong = min(row["contacts"] for row in rows if row["share that agrees"] < 1.0)
+    wrong = min((row["contacts"] for row in rows if row["share that agrees"] < 1.0), default=limit + 1)
     prices = [row["time of pushing"] / row["time of (21)"] for row in rows]
     panels = list[Panel]()
     for key, alt, label, axis in (

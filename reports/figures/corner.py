@@ -38,6 +38,7 @@ MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
 _AT_CONTACT = (-0.01, 0.14)  # [s] from the first contact: the impulses of all worlds, separately visible
+_LIMITED = ("fig09", "fig10")  # figures of trajectories with a limited device
 _LAST_PART = 0.2  # of the run: long after the last impact of any world, the mean is the balance of forces
 _MARKS = 9  # markers along a curve: enough to identify it in grey print, few enough to see the line
 _APART = 0.05  # share of the largest distance between curves at which they are seen to part, and to stay at rest
@@ -150,7 +151,7 @@ def _trajectories(key: str, runs: Mapping[str, Run], traces: Traces) -> list[Pan
                         "distance from ideal [mm]", "distance from ideal, position"),
                    over("off-angle", {curve: DEGREES * np.abs(path[:, 2]) for curve, path in off.items()},
                         "angle from ideal [°]", "distance from ideal, angle")]  # fmt: skip
-    if "ideal" in traces and any(np.any(trace.impact_scale < 1.0) for trace in traces.values()):
+    if key in _LIMITED:
         apart = {curve: MILLI * np.hypot(*(trace.tool - trace.device)[:, :2].T) for curve, trace in traces.items()}
         depths = {curve: MILLI * trace.penetration for curve, trace in traces.items()}
         panels += [over("apart", apart, "distance [mm]", "how far tool and device come apart"),
