@@ -21,6 +21,7 @@ from matplotlib.transforms import Bbox
 from iapb.run import Run
 from reports.figures import RECIPES, plot
 from reports.figures.condition_map import condition_map
+from reports.figures.corner import penetration_over_time
 from reports.figures.figure import Figure, Recipe, draw, standalone
 from reports.figures.labels import arrow_of_time, label_marks, name_curves
 from reports.figures.numbers import format_number
@@ -211,6 +212,14 @@ def test_figure_3_has_the_energies_that_follow_from_the_geometry() -> None:
         for contact in "AB":  # the loss is proportional to 1 - e²
             lost = before - table[f"{reading}, {contact}"]
             np.testing.assert_allclose(lost, share * lost[0], atol=1e-13)
+
+
+def test_penetration_is_that_of_the_deepest_contact(gallery: Gallery) -> None:
+    run = gallery.inputs["corner/IAPB"]
+    depth, rows = penetration_over_time(run), run.contacts
+    for k in range(run.steps):
+        gaps = rows.gap[rows.offsets[k] : rows.offsets[k + 1]]
+        assert depth[k] == max(-gaps.min(), 0) if len(gaps) else depth[k] == 0
 
 
 def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes() -> None:

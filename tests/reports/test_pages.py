@@ -26,6 +26,8 @@ from reports.pages.sections import SECTIONS
 from reports.pages.terms import TERMS, explained, readable, terms_of
 from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
 from tests.reports.joined import joined
+from verification.claims import CLAIMS
+from verification.claims.conditions import FULL_GRID
 from verification.claims.peg import ALL_THREE, LARGE
 from verification.finding import (
     BEYOND,
@@ -249,6 +251,24 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     assert ">fails<" in line and "1 of 40, 7 cannot tell" in line
     assert "1 holds in part and fails in a named quantity" in page.split("1 claims:")[1]
     assert badge_words(topics[0]) == "1 of 2 findings fail" and badge_words(one("p", Part("a", REFUTED))) == "fails"
+
+
+def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None:
+    claim = CLAIMS["C10"]
+    near, far = {"IAPB": 1e-5, "PB": 1e-4, "CBuc": 1e-4}, {"IAPB": 1e-3, "PB": 1e-4, "CBuc": 1e-4}
+    rows = [start.row() | (near if start.tilt <= 0.015 else far) | {"coordinate": "x", "part": "x"}
+            for start in FULL_GRID]  # fmt: skip
+    found = claim.conclude(claim.table_of(rows))
+    pile = dict.fromkeys(("share that agrees", "time of (21)", "time of pushing"), 10.0)
+    piles = [pile | {"rows": "touching", "most contacts that agree": 14, "contacts": contacts,
+                     "share of impulses that pull": pulls, "pushing from the LCP": 1e-3 * pulls}
+             for contacts, pulls in ((10, 0.0), (40, 0.25))]  # fmt: skip
+    topic = one("complementarity", tables={"piles": table_from(piles)})
+    page = joined(Evidence(claims=(found,), topics=(topic,)))
+    assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
+    assert "agreed with complementarity has 14" in page and f"agrees to {prose('3e-04')}" in page
+    fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
+    assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
 
 
 def test_the_answer_is_made_from_the_claims() -> None:

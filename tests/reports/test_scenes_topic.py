@@ -15,7 +15,7 @@ from iapb.simulation import simulate
 from reports.evidence.runs import FIGURE_RUNS
 from reports.figures import scenes
 from reports.figures.geometry import cuboid, cuboid_of_inertia, placement, view
-from verification.finding import MIXED, REFUTED, Finding, finding_of
+from verification.finding import MIXED, REFUTED, REPRODUCED, Finding, finding_of
 from verification.scenes import ledger
 from verification.scenes.books import residual_row
 
@@ -43,6 +43,14 @@ def _topic(runs: tuple[Run, ...], order: float = 1.0) -> Finding:
 @pytest.fixture(scope="module")
 def topic(runs: tuple[Run, ...]) -> Finding:
     return _topic(runs)
+
+
+def test_sentences_say_the_numbers(topic: Finding) -> None:
+    deepest = max(topic.tables["contact"].records(), key=lambda row: row["most penetration"])
+    assert f"{deepest['most penetration']:.2f} mm ({deepest['scene']})" in topic.parts[0].sentence
+    assert all(part.sentence.endswith(".") for part in topic.parts)
+    assert {part.verdict for part in topic.parts} <= {REPRODUCED, MIXED}
+    assert "4 scenes, 3 of them in space" in topic.answer
 
 
 def test_worse_records_are_judged_worse(runs: tuple[Run, ...]) -> None:

@@ -58,6 +58,12 @@ def test_a_run_comes_back_bit_for_bit(tmp_path: Path, make_run: MakeRun, shape: 
     assert_same(read_run(write_run(tmp_path / "run.h5", run)), run)
 
 
+def test_a_run_saves_itself_and_replaces_a_file_only_if_asked(tmp_path: Path, make_run: MakeRun) -> None:
+    first, other = make_run(), make_run(seed=1)
+    for run, replace, kept in ((first, False, first), (other, False, first), (other, True, other)):
+        assert content_hash(read_run(run.save(tmp_path / "run.h5", replace=replace))) == content_hash(kept)
+
+
 def test_the_content_hash_is_that_of_the_results_alone(tmp_path: Path, make_run: MakeRun) -> None:
     run = make_run()
     slower = dataclasses.replace(run, chunk_seconds=run.chunk_seconds * 3, kernel="python")
