@@ -1,9 +1,9 @@
 """The Coq development in `verification/proofs/coq`: its compilation, its assumptions, and the extracted checker.
 
 `Checker.v` verifies an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file that
-`iapb certify --export` writes. `Passive.v` proves with Flocq the basis of the last step of the resolver. `Theorems.v`
-states Theorems 1 and 2 and (33) by hand. If coqc, Flocq or OCaml is missing, the result names the missing program and
-claims nothing.
+`iapb certify --export` writes. `Passive.v`, `Accepted.v` and `Wide.v` prove with Flocq what the resolver's last step
+accepts. `Theorems.v` states Theorems 1 and 2 and (33) by hand. If coqc, Flocq or OCaml is missing, the result names the
+missing program and claims nothing.
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ KNOWN_AXIOMS = frozenset({
 STATEMENTS = "Theorems"  # the file with theorems that are also statements of the kernel, by the same names
 NOT_RUN, NO_ANSWER = "not run here", "no answer"
 # Text for the report beside the theorems: the rest of the proof that an accepted candidate never gains energy.
-ARGUED = ("Not proved in Coq: the error bound of theorem gain_error is below the radius that the function `gain` "
-          "returns (rational arithmetic shows this for each d; the rounding of the radius has an argument in prose). "
-          "The bounds of the other three evaluations, and the rejection of every overflow, are argued in prose only.")
+ARGUED = ("Not proved in Coq: that the compiled kernel does the operations that the theorems state, in this order, and "
+          "that frexp and ldexp are exact.")
 _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 
@@ -103,6 +102,9 @@ def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
     """
     if reason := lacking(name):
         raise MissingDependencyError(reason.partition(" ")[0], "the Coq development", _HINT)
+    for needed in re.findall(r"^Require Import (\w+)\.$", _source(name), re.MULTILINE):
+        if not (folder / f"{needed}.vo").exists():
+            compiled(needed, folder)
     shutil.copy(FOLDER / f"{name}.v", folder)
     said = _run(["coqc", "-q", f"{name}.v"], folder)
     asked, answers = _asked(name), _assumptions(said)

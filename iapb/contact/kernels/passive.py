@@ -6,9 +6,9 @@ Let s = w + v, Δ = w − v and A = M + Mᵀ, each an exact pair of doubles. Fou
 
 for the mass matrix M as given. A skew part of M cancels, and M is not replaced by a rounded symmetric part. (Δᵀ M s,
 without the transpose, differs from Γ/2 if M is asymmetric in the last bit.) A candidate w is accepted if an upper bound
-of Γ is not positive. Two functions bound Γ, each with a proof of its bound: `gain` in double-double, which Coq checks
-(verification/proofs/coq), and `wide_gain` for numbers of any size. u = 2⁻⁵³ and η = 2⁻¹⁰⁷⁴. Operations round to
-nearest, without fastmath and without contraction. d ≤ 2¹⁵, so that (1 + u) to the power 8d² + 9 is below θ = 1 + 2⁻¹⁶.
+of Γ is not positive. Two functions bound Γ: `gain` in double-double, and `wide_gain` for numbers of any size. Coq
+proves both bounds for d ≤ 2¹⁵ (verification/proofs/coq). u = 2⁻⁵³ and η = 2⁻¹⁰⁷⁴. Operations round to nearest, without
+fastmath and without contraction.
 """
 
 from __future__ import annotations
@@ -31,20 +31,11 @@ _GROWTH = 4.0  # of what is taken off a step, from one attempt to the next, shou
 def gain(mass_matrix, v, w):
     """Evaluate Γ in double-double: return (high, low, radius, underflow) with |Γ − (high + low)| ≤ radius + underflow.
 
-    Proof of the bound, with Rᵢ = Σⱼ |ah sh| and S = Σᵢ |dhᵢ| Rᵢ. The pairs s = sh + sl, Δ = dh + dl, A = ah + al are
-    exact (TwoSum), |sl| ≤ u|sh| and so on. In row i, h + l approximates Σⱼ Aᵢⱼ sⱼ; step j adds p + e = ah·sh, exact
-    (TwoProduct), and c = fl(fl(ah·sl) + fl(al·sh)); TwoSum(h, p) = h' + t is exact. Errors, in units of u² θ
-    Rᵢ over the row: omitted al·sl 1; the two products in c 2; their sum 2; fl(t + e) d + 1, as |t| ≤ u|h'| and |e| ≤
-    u|p|; adding c to it d + 3; adding that to l, |l| ≤ u(k + 3) Rᵢ after k steps, d²/2 + 7d/2. Together d²/2 + 11d/2 +
-    9. The sum over i goes the same way with the row's (h, l), |l| ≤ u(d + 3) Rᵢ, in place of (sh, sl), in units of u² θ
-    S: omitted dl·l d + 3; the products 1 + (d + 3); their sum d + 4; fl(t + e) d + 1; adding c 2d + 5; adding to l,
-    now |l| ≤ u(k + d + 5) S, 3d²/2 + 11d/2. Together with the rows 2d² + 17d + 26. `radius` is 2 (d+6)² u² S = (2d² +
-    24d + 72) u² S. The excess of 7d + 46 covers θ, the rounding of S and of the radius, and that of low + radius, which
-    callers add first: u|low| ≤ (2d + 5) u² S.
-
-    Underflow: the error of TwoProduct is then at most 7η/2 (Boldo 2006), of the other products η/2: in sum at most
-    6dη Σ|dhᵢ| + 6dη, with the underflow in S; `underflow` is 2⁵⁴ d η (1 + Σ|dhᵢ|). Overflow, also in Dekker's
-    splitting, makes high + (low + radius) NaN or infinite, which fails every comparison.
+    The pairs s, Δ and A are exact (TwoSum), products of high parts too (TwoProduct); `low` collects what both leave.
+    In units of u² S, S = Σᵢⱼ |dhᵢ ahᵢⱼ shⱼ|, the error is about 2d² + 17d + 26, and `radius` 2 (d+6)² = 2d² + 24d + 72.
+    Coq proves the bound for every d ≤ 2¹⁵, with the rounding of S, of `radius` and of the sum that callers form, and
+    `underflow` for products below 2⁻⁹⁶⁹. Overflow, also in Dekker's splitting, makes high + (low + radius) NaN or
+    infinite, which `gain_enclosure` refuses (verification/proofs/coq/Accepted.v, never_gains_in_binary64).
     """
     d = v.shape[0]
     high = low = size = moved = 0.0
@@ -77,13 +68,12 @@ def wide_gain(mass_matrix, v, w):
 
     Γ = Σᵢⱼ Mᵢⱼ (Δᵢ sⱼ + sᵢ Δⱼ) has n = 8d² products x M y of doubles, x and y the halves of the pairs Δ and s. Each is
     evaluated on mantissas in [½, 1), so that nothing under- or overflows, and scaled to the largest exponent among them
-    by a power of two. Scaling is exact: products are multiples of 2⁻¹⁶⁰, and those below 2⁻⁸⁰⁰ are omitted.
+    by a power of two. Products below 2⁻⁸⁰⁰ are omitted.
 
     Proof of the bound: with p + e = x M and q + f = p y exactly, the low part fl(f + fl(e y)) errs by 3u² of the
-    product; the sum is the compensated one of `gain`: with S = Σ|q|, (n + 3) u² for fl(t + f) and (n²/2 + 7n/2) u² for
-    low. Together this is below (n + 5)² u² S, whose excess covers θ and the rounding of S and of low + radius. The
-    omitted terms, at most n 2⁻⁸⁰⁰, are added. If w ± v could overflow, both are divided by 4 first. Bits of the smaller
-    one that this loses are below 2⁻²⁰⁰⁰ of the larger one, whose products are in the sum too.
+    product; the sum is the compensated one of `gain`. With the rounding of S = Σ|q| and of low + radius this is below
+    (n + 5)² u² S; the omitted terms, at most n 2⁻⁸⁰⁰, are added. Coq proves it, and that no number overflows, if
+    frexp and ldexp are exact (verification/proofs/coq/Wide.v, wide_never_gains_in_binary64).
     """
     d, top, count = v.shape[0], -100_000, 0
     high = low = size = 0.0
@@ -118,8 +108,11 @@ def wide_gain(mass_matrix, v, w):
 
 @kernel
 def _half(v, w, difference, is_low):
-    """Return mantissa and exponent of the high or the low half of w − v or of w + v."""
-    scale, shift = (0.25, 2) if max(abs(v), abs(w)) > 2.0**1020 else (1.0, 0)
+    """Return mantissa and exponent of the high or the low half of w − v or of w + v.
+
+    The sum of quarters cannot overflow, and they are exact; where one of the two is below 2⁹⁰⁰, neither can w ± v.
+    """
+    scale, shift = (0.25, 2) if min(abs(v), abs(w)) > 2.0**900 else (1.0, 0)
     high, low = two_sum(scale * w, -scale * v if difference else scale * v)
     mantissa, exponent = math.frexp(low if is_low else high)
     return mantissa, exponent + shift
@@ -129,12 +122,13 @@ def _half(v, w, difference, is_low):
 def gain_enclosure(mass_matrix, v, w):
     """Return (lower, upper, exponent): Γ lies in [lower, upper] · 2^exponent, up to one rounding of each end.
 
-    If upper ≤ 0, then Γ ≤ 0 is certain: the last sum rounds once and keeps its sign.
+    If upper ≤ 0, then Γ ≤ 0 is certain: the last sum rounds once and keeps its sign. An infinite one can be wrong: the
+    halves of a product near 2¹⁰²⁴ can overflow where it does not.
     """
     high, low, radius, underflow = gain(mass_matrix, v, w)
     radius += underflow
     upper = high + (low + radius)
-    if math.isfinite(upper) and 3.0 * underflow <= radius or radius == 0.0 or upper <= 0.0:
+    if radius == 0.0 or math.isfinite(upper) and (3.0 * underflow <= radius or upper <= 0.0):
         return high + (low - radius), upper, 0
     high, low, radius, exponent = wide_gain(mass_matrix, v, w)
     return high + (low - radius), high + (low + radius), exponent

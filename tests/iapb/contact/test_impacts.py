@@ -134,6 +134,15 @@ def test_energy_is_enclosed_where_its_squares_leave_the_range(power: int, skew: 
                 assert high - low <= 2.0**-90 * float(np.abs(v) @ np.abs(M) @ np.abs(v))
 
 
+def test_energy_is_enclosed_where_only_halves_of_its_products_overflow() -> None:
+    """Δ A s is finite, but not the product of the rounded halves of its factors; a bound of −∞ is not accepted."""
+    M, v = np.array([[float.fromhex("0x1.492a43be43642p-1")]]), np.array([float.fromhex("-0x1.c386bbc204f8ap+511")])
+    found = resolve_impact(M, np.eye(1), v, 0.0)
+    change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
+    assert Fraction(low) <= change <= Fraction(high) < 0
+    assert abs(Fraction(found.energy_change) - change) <= Fraction(math.ulp(found.energy_change))
+
+
 @given(seed=st.integers(0, 10_000), powers=st.lists(st.integers(-60, 60), min_size=6, max_size=6),
        speed=st.integers(-200, 200), mass=st.integers(-100, 100), clamp=st.booleans())
 def test_units_by_powers_of_two_change_no_bit(seed: int, powers: list[int], speed: int, mass: int, clamp: bool) -> None:

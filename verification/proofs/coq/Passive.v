@@ -3,11 +3,9 @@
 
    Proved here: [two_sum] is exact; [two_product] is exact where nothing underflows, and within 7/2 of the smallest number
    always; [compensated], the running bound by induction on the number of terms; [loop_error], the error of either loop of
-   `gain`; [gain_error], the error of `gain` as a whole; [accepted_never_gains], what the comparison with 0 shows. That the
-   bound of [gain_error] is below the radius that `gain` returns is not proved here: `radius_margins` in
-   verification/proofs/bounds.py compares them in rational numbers, for each d.
+   `gain`; [gain_error], the error of `gain` as a whole; [accepted_never_gains], what the comparison with 0 shows.
 
-   Numbers are real numbers of binary64's format whose exponent has no upper end: overflow is not modelled. *)
+   Numbers are real numbers of binary64's format whose exponent has no upper end; Accepted.v adds overflow. *)
 
 From Coq Require Import ZArith Reals List Lia Lra Psatz.
 From Flocq Require Import Core Relative Plus_error Pff2Flocq.
@@ -543,7 +541,8 @@ Theorem gain_error rows :
   let terms := map product_term (map outer rows) in let S := weights terms in
   length rows = d -> Forall row_fits rows ->
   Rabs (gamma rows - (fst (summed terms) + snd (summed terms)))
-    <= error_bound S G (4 * eta) g2 f2 n S + total (rest q2 z2) (map outer rows) + rows_error rows.
+    <= error_bound S G (4 * eta) g2 f2 n S + total (rest q2 z2) (map outer rows) + rows_error rows /\
+  Rabs (snd (summed terms)) <= G * low_bound S G (4 * eta) g2 f2 n S.
 Proof.
   intros terms S Hd HF.
   pose proof u_positive as Hu. pose proof eta_positive as He.
@@ -569,9 +568,9 @@ Proof.
     apply Rle_trans with (1 := Hl). right. unfold low_bound, q2, z2. fold g1 f1. fold (row_weight r). ring. }
   assert (HO : Forall (sized q2 z2 D) (map outer rows)).
   { apply Forall_map. apply Forall_impl with (2 := HF). intros r Hr. apply (One r Hr). }
-  destruct (loop_error q2 z2 D q2_positive z2_positive (map outer rows) G HO D_positive) as (Hx & _ & _).
+  destruct (loop_error q2 z2 D q2_positive z2_positive (map outer rows) G HO D_positive) as (Hx & _ & Low).
   { rewrite map_length, Hd. exact G_large. }
-  rewrite map_length, Hd in Hx. fold n g2 f2 terms S in Hx.
+  rewrite map_length, Hd in Hx, Low. fold n g2 f2 terms S in Hx, Low. split; [| exact Low].
   assert (Rest : Rabs (gamma rows - total product (map outer rows)) <= rows_error rows).
   { clear - HF One. induction rows as [| r rows IH]; simpl.
     - rewrite Rminus_0_r, Rabs_R0. lra.
