@@ -10,7 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, MissingDependencyError
+from iapb.lazy import needed
 from reference.datasets import problem_files, write_fclib
 from reference.worlds import run_world
 from reports.commands.run import Values, scene_given
@@ -91,7 +92,13 @@ def compare(
     place = out or FOLDER / f"{name}.json"
     lines += [sentence(part.sentence, "• ") for part in found.parts]
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in found.failures]
-    drawn = draw(worlds_figure, found.tables) if scene is not None else None
+    drawn = None
+    if scene is not None:
+        try:
+            needed("matplotlib", "The figure")
+            drawn = draw(worlds_figure, found.tables)
+        except MissingDependencyError as missing:  # the numbers are worth printing without it
+            lines.append(str(missing))
     place.parent.mkdir(parents=True, exist_ok=True)
     if drawn is not None and drawn.panels:
         place.with_suffix(".svg").write_text(standalone(drawn), encoding="utf-8")

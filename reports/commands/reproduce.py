@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from iapb.errors import ArgumentError
+from iapb.lazy import needed
 from iapb.names import one_of
 from reports.commands.report import difference_lines
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, unlike
@@ -43,6 +44,8 @@ def reproduce(
     json_: Json = False,
 ) -> Answer:
     """Regenerate the report; cached results are reused."""
+    for package in ("matplotlib", "latex2mathml"):  # if one is missing, say it before minutes of computing
+        needed(package, "iapb reproduce")
     depth, folder = "full" if full else "quick", out or Path("out")
     if check is not None:
         return check_report(check, out)
