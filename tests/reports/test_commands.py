@@ -107,7 +107,7 @@ def archive(path, gain=False):
 
 def listed(command):
     """The keys that the documents list for a command: the words before what stands in brackets."""
-    [row] = re.findall(rf"^\| `{command}` \| (.*) \|$", (ROOT / "docs" / "scenes.md").read_text("utf-8"), re.M)
+    [row] = re.findall(rf"^\| `{command}` \| (.*) \|$", (ROOT / "docs" / "report.md").read_text("utf-8"), re.M)
     return {key.strip() for key in re.sub(r"\([^)]*\)|;.*", "", row).split(",")}
 
 
