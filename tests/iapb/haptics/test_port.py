@@ -71,7 +71,7 @@ def test_unilateral_actuators_give_the_coupler_alone_and_others_all_of_it() -> N
 
 
 def test_pulses_wait_where_they_would_give_more_than_collisions_took_and_lose_no_momentum() -> None:
-    """Of random collisions and motions: what a step cannot see before it lets a pulse go is its change of speed."""
+    """Of random collisions; what a step cannot see before it lets a pulse go is its change of speed."""
     system, world, state, port = started(BEHIND.with_values({"device.waveform": "brake", "rate": 1000}))
     rng, tool, dt = np.random.default_rng(0), slice(*system.tool_dofs), world.dt
     took = work = slack = 0.0
@@ -79,7 +79,9 @@ def test_pulses_wait_where_they_would_give_more_than_collisions_took_and_lose_no
     for step in range(300):
         port.clock[0], state.impacts.logged[0], port.environment_force[:] = step, 2, 0.0
         state.impulse[:] = rng.normal(size=len(state.impulse)) * (rng.random() < 0.4)
-        port.device_v[:], port.acceleration[:] = rng.normal(size=(2, len(port.device_v)))
+        waiting = port.pulse_pending[step % len(port.pulse_pending)]  # the device moves along it: the worst case
+        port.device_v[:] = np.abs(rng.normal(size=len(waiting))) * np.sign(waiting + 1e-9)
+        port.acceleration[:] = rng.normal(size=len(waiting))
         state.impacts.group[:2], state.impacts.energy_lost[:2] = rng.permutation(2), rng.exponential(0.05, 2)
         state.island_of_tree[:] = (0, 1)
         took += state.impacts.energy_lost[:2][state.impacts.group[:2] == 1].sum()
