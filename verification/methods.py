@@ -28,19 +28,23 @@ def gram_cholesky(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Return v⁺ by (19), with Cholesky's factor of W; the rows must be independent."""
     push = np.linalg.solve(M, J.T)
     W = J @ push
-    length = np.sqrt(np.maximum(np.diag(W), 0.0))
-    # The smallest eigenvalue of a Gram matrix of unit rows is known to c·ε only.
-    if not length.all() or np.linalg.eigvalsh(W / np.outer(length, length)).min(initial=1.0) <= 8.0 * len(J) * _EPS:
+    length, scale = np.sqrt(np.maximum(np.diag(W), 0.0)), np.sqrt(np.diag(M))
+    # The solution with M leaves the smallest eigenvalue of the Gram matrix of unit rows known to c·ε·κ only.
+    known = 8.0 * len(J) * _EPS * np.linalg.cond(M / np.outer(scale, scale))
+    if not length.all() or np.linalg.eigvalsh(W / np.outer(length, length)).min(initial=1.0) <= known:
         raise ArgumentError("contact_jacobian", J.shape, "independent rows for method 'gram_cholesky'")
     root = np.linalg.cholesky(0.5 * (W + W.T))
     return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(root.T, np.linalg.solve(root, J @ v))))
 
 
 def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Return v⁺ by (W + λI)⁻¹, λ = 1e-10 of W's largest diagonal entry: each mode keeps part of its approach."""
+    """Return v⁺ by (W + λI)⁻¹, λ = c ε of W's largest diagonal entry, the rounding of W.
+
+    Each mode keeps part of its approach: with 1e-8, 1e-10, 1e-12 or 1e-14 in place of c ε more hard cases fail.
+    """
     push = np.linalg.solve(M, J.T)
     W = J @ push
-    share = 1e-10 * max(np.diag(W).max(initial=0.0), np.finfo(float).tiny)
+    share = len(J) * _EPS * max(np.diag(W).max(initial=0.0), np.finfo(float).tiny)
     return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(W + share * np.eye(len(W)), J @ v)))
 
 

@@ -66,7 +66,7 @@ _SLOW = 0.2  # [s] a slower call is not repeated
 _HALF_SUBNORMAL = Fraction(1, 2**1075)  # rounding error of subnormal numbers, which no relative bound covers
 _FORM_DELASSUS = ("gram_pinv", "gram_cholesky", "damped")
 # The residuals of these methods depend on the LAPACK: 7e-9 to 5e-8 on Kahan's rows, with a tolerance of 1e-8.
-_THROUGH_LAPACK = ("gram_pinv", "gram_cholesky", "svd")
+_THROUGH_LAPACK = ("gram_pinv", "gram_cholesky", "damped", "svd")
 _NOISE = 10.0  # a residual within this factor of the tolerance decides nothing
 # An error of more than half of |v⁻| is entirely noise, and the sign of the energy gain is then random (relative gains
 # of −1e-3 to 1e-4, depending on the BLAS, for the printed formula on rows 1e-4 apart).
