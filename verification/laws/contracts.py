@@ -111,9 +111,9 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
         used, p = directions, least_push(rays.reshape(-1, case.coordinates), target).reshape(directions.shape[:2])
         rest = target - np.einsum("ck,ckd->d", p, rays)
         distance = min(distance, float(np.linalg.norm(rest)))
-        if distance <= NEAR or m == 0:
+        if distance <= NEAR:
             return distance
-        if m == 1:  # the rays are all; least squares end early where a large p along nearly opposed ones is needed
+        if m < 2:  # the rays are all; least squares end early where a large p along nearly opposed ones is needed
             break
         more = np.stack([np.einsum("ck,ckm->cm", p, directions), tangents @ rest], axis=1)
         size = np.linalg.norm(more, axis=2, keepdims=True)
@@ -153,7 +153,7 @@ def _descend(blocks: Floats, friction: Floats, target: Floats, p: Floats) -> flo
 def _inside(p: Floats, friction: Floats) -> Floats:
     """Return the closest impulses (c, 1 + m) inside the cones |p_t| ≤ μ p."""
     along = np.linalg.norm(p[:, 1:], axis=1)
-    inside = along <= friction * p[:, 0]
+    inside = (along <= friction * p[:, 0]) & (p[:, 0] >= 0.0)
     normal = np.where(inside, p[:, 0], np.maximum(0.0, (p[:, 0] + friction * along) / (1.0 + friction**2)))
     share = np.where(inside, 1.0, friction * normal / np.where(along > 0.0, along, 1.0))
     return np.concatenate([normal[:, None], share[:, None] * p[:, 1:]], axis=1)
