@@ -249,9 +249,10 @@ engines = Topic(
     key="engines", title="Other engines",
     question="Every installed engine simulates eight frictionless scenes of known outcome: conservation of energy and "
     "momentum with symmetry determine the outcome, or nothing may move. Each scene runs twice: with the settings that "
-    "suit the engine best, and with a time step of 1 ms. One program computes energy, momentum and overlap from the "
-    "positions and velocities of all engines. MuJoCo and Drake have no coefficient of restitution; springs with "
-    "suitable damping replace it.",
+    "suit the engine best, and with a time step of 1 ms. One rule chooses the settings of other engines: the smallest "
+    "error on a grid (docs/engines.md). Ours run with their defaults. One program computes energy, momentum and "
+    "overlap from the positions and velocities of all engines. MuJoCo and Drake have no coefficient of restitution; "
+    "springs with suitable damping replace it.",
     checks=(ERRORS, Check(key="settings", question="With which settings did the engines run?",
                           cases=lambda study: SIMULATORS, row=_settings)),
     says=_answer,
