@@ -5,13 +5,16 @@ from __future__ import annotations
 import pickle
 from functools import partial
 
+import numpy as np
 import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import ArgumentError
 from tests.verification.laws.faults import PUSHING, TOO_MUCH, newton, no_friction, returns_too_much
 from verification import check_passivity
+from verification.impacts import ImpactCase
 from verification.laws import CONTRACTS, sound_resolver
+from verification.laws.contracts import distance_from_cone
 
 
 @pytest.mark.parametrize(("contract", "name"), PUSHING)
@@ -21,6 +24,21 @@ def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> Non
     assert report.broken_laws == (law,)
     with pytest.raises(AssertionError, match=law):
         exec(report.counterexample_test + f"\n\ntest_{law}()", {"resolver": resolver})
+
+
+def test_a_push_along_nearly_opposed_rows_is_no_pull_and_a_pull_is_one() -> None:
+    """Least squares end 2e-7 before the first; a target opposite to every row is at its own distance."""
+    rng = np.random.default_rng(98)
+    rows = rng.normal(size=(6, 4))
+    for i in range(4):
+        opposed = rows[4] + rows[5] if i % 2 else rows[4]
+        rows[i] = 3e-5 * rng.normal(size=4) - opposed
+    pushed = rows.T @ rng.random(6)
+    pushed /= np.linalg.norm(pushed)
+    assert not distance_from_cone(ImpactCase(np.eye(4), rows, -pushed, 0.0), pushed) > 1e-7
+    rows = np.abs(rng.normal(size=(3, 4)))
+    pulled = -rows.sum(axis=0) / np.linalg.norm(rows.sum(axis=0))
+    assert distance_from_cone(ImpactCase(np.eye(4), rows, -pulled, 0.0), pulled) == pytest.approx(1.0)
 
 
 def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
