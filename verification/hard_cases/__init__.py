@@ -2,7 +2,6 @@
 
 from verification.hard_cases.case import CaseAbsent as CaseAbsent
 from verification.hard_cases.case import HardCase as HardCase
-from verification.hard_cases.case import HardCaseVerdict as HardCaseVerdict
 from verification.hard_cases.case import TrajectoryCase as TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES as HARD_CASES
 from verification.hard_cases.judge import judge_hard_case as judge_hard_case

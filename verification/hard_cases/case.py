@@ -27,7 +27,6 @@ COULOMB = "ideal with friction"  # the rigid world with Coulomb friction; the pa
 RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
 NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps
 STABLE, DEPENDS_ON_ROUNDING = "stable", "depends on rounding"
-_NONE = float("nan")
 
 
 class CaseAbsent(IapbError):
@@ -202,45 +201,6 @@ def largest_gain(run: Run) -> float:
     dropped = float(ledger["potential"][0] - ledger["potential"].min())
     fed = float(kinetic[0] + np.abs(given).max()) + dropped
     return float(gain.max()) / max(fed, float(np.finfo(float).tiny))
-
-
-@dataclass(frozen=True)
-class HardCaseVerdict:
-    """The verdict of one method or world on one case; a number that does not apply or is missing is NaN.
-
-    Attributes
-    ----------
-    verdict : "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "timed out", "out of memory",
-        "failed", or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their residual is within a factor
-        of ten of the tolerance, or their error exceeds half of |v⁻|, so another BLAS may change the verdict.
-    note : the message of the error if there is no answer.
-    energy_gain : impacts: the exact (KE⁺ − KE⁻)/KE⁻; trajectories: see `largest_gain`.
-    energy_bound : gain that rounding (10 d ε √κ(M)) or the time step may cause.
-    restitution_residual : max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the largest remaining approach velocity,
-        scaled in the same way; trajectories: see `judge.restitution_residual`.
-    forward_error : impacts: |v⁺ − truth| / |v⁻| in the kinetic metric; trajectories: relative distance from the law.
-    forward_bound : error that the conditioning or the time step may cause.
-    smallest_fault : for a stable verdict, the smallest relative fault in the answer that changes the verdict.
-    rank, exact_rank : rank that the method used, None if it does not say, and rank of the exact Jacobian; trajectories:
-        the largest rank of an impact, and None.
-    clamp : factor of the energy clamp.
-    seconds : median time of one call, or of one step [s].
-    """
-
-    case: str
-    method: str
-    verdict: str
-    note: str = ""
-    energy_gain: float = _NONE
-    energy_bound: float = _NONE
-    restitution_residual: float = _NONE
-    forward_error: float = _NONE
-    forward_bound: float = _NONE
-    rank: int | None = 0
-    exact_rank: int | None = 0
-    clamp: float = _NONE
-    seconds: float = _NONE
-    smallest_fault: float = _NONE
 
 
 def smallest_fault(turns: Callable[[float], bool]) -> float:

@@ -17,7 +17,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache, partial
@@ -45,12 +45,12 @@ from verification.hard_cases.case import (
     Floats,
     FrictionalCase,
     HardCase,
-    HardCaseVerdict,
     TrajectoryCase,
     smallest_fault,
 )
 from verification.hard_cases.exact import fractions_of
 from verification.methods import COMPARED
+from verification.table import Row
 
 Simulate = Callable[[Scene, str], Run]
 
@@ -92,8 +92,25 @@ def methods_for(case: AnyCase) -> tuple[str, ...]:
     return case.worlds
 
 
-def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_world) -> HardCaseVerdict:
-    """Return the verdict of one method on one impact, or of one world on one trajectory."""
+# The numbers of a verdict in a row; a number that does not apply, or is missing or not finite, is None.
+_NUMBERS = (
+    "energy gain",  # impacts: the exact (KE⁺ − KE⁻)/KE⁻; motions: see `largest_gain`
+    "gain allowed",  # by rounding (10 d ε √κ(M)) or by the time step
+    "restitution residual",  # max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the largest approach left
+    "forward error",  # impacts: |v⁺ − truth| / |v⁻| in the kinetic metric; motions: relative distance from the law
+    "error allowed",  # by the conditioning or the time step
+    "smallest fault seen",  # the smallest relative fault in a stable answer that changes the verdict
+)
+
+
+def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_world) -> Row:
+    """Return the row of one method on one impact, or of one world on one trajectory.
+
+    The outcome is "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "timed out", "out of
+    memory", "failed", or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their residual is within a
+    factor of ten of the tolerance, or their error exceeds half of |v⁻|, so another BLAS may change the outcome. The
+    rank is the one that the method used, or the largest of a run's impacts; the time is that of a call or a step.
+    """
     return judge_impact(case, method) if isinstance(case, HardCase) else _judge_motion(case, method, simulate)
 
 
@@ -103,13 +120,13 @@ def _compile_step() -> None:
     simulate(load_scene(find_scene("two_discs")), steps=1)
 
 
-def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> HardCaseVerdict:
-    """Return the verdict of one world on one motion."""
+def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
+    """Return the row of one world on one motion."""
     _compile_step()
     try:
         run = (run_in_world if world == COULOMB else simulate)(case.scene, world)
     except IapbError as error:
-        return HardCaseVerdict(case.name, world, _verdict_of(error), str(error), exact_rank=None)
+        return _row(world, _verdict_of(error), note=str(error))
     found, residual = case.measure(run), restitution_residual(run)
     restored = not residual > RESTITUTION_TOLERANCE  # NaN: the run has no collision to judge
     verdict = _verdict(found.energy_gain <= found.energy_bound, restored, found.error <= found.error_bound)
@@ -120,11 +137,15 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> HardC
 
     fault = smallest_fault(is_seen) if verdict == STABLE else math.nan
     seconds = float(np.median(run.chunk_seconds / run.chunk_steps)) if len(run.chunk_steps) else math.nan
-    return HardCaseVerdict(
-        case.name, world, verdict, "", found.energy_gain, found.energy_bound, residual,
-        found.error, found.error_bound, int(run.impacts.rank.max(initial=0)), None,
-        float(run.impacts.clamp.min(initial=1.0)), seconds, fault,
-    )  # fmt: skip
+    numbers = found.energy_gain, found.energy_bound, residual, found.error, found.error_bound, fault
+    return _row(world, verdict, numbers, int(run.impacts.rank.max(initial=0)), None, seconds)
+
+
+def _row(method: str, outcome: str, numbers: Sequence[float] = (math.nan,) * len(_NUMBERS), rank: int | None = None,
+         exact_rank: int | None = None, seconds: float = math.nan, note: str = "") -> Row:  # fmt: skip
+    known = {name: x if math.isfinite(x) else None for name, x in zip(_NUMBERS, numbers, strict=True)}
+    return {"method": method, "outcome": outcome, **known, "rank": rank, "exact rank": exact_rank,
+            "time [µs]": 1e6 * seconds if math.isfinite(seconds) else None, "note": note}  # fmt: skip
 
 
 def _verdict(passive: bool, restored: bool, right: bool) -> str:
@@ -179,24 +200,23 @@ class OutOfMemory(IapbError):
 
 
 class Answer(NamedTuple):
-    """The judged quantities of an impact, v⁺, rank (None: not known) and clamp, and the time of the call [s]."""
+    """The judged quantities of an impact, v⁺ and rank (None: not known), and the time of the call [s]."""
 
     velocity: Any
     rank: int | None
-    clamp: float
     seconds: float
 
 
-def judge_impact(case: HardCase, method: str) -> HardCaseVerdict:
-    """Return the verdict of one method on one impact."""
+def judge_impact(case: HardCase, method: str) -> Row:
+    """Return the row of one method on one impact."""
     truth = case.truth
     energy_bound = 10.0 * len(case.velocity) * EPS * float(np.sqrt(truth.condition))
     forward_bound = allowed_error(case)
     try:
         answer = _answer(case, method)
     except IapbError as error:
-        return HardCaseVerdict(case.name, method, _verdict_of(error), str(error), energy_bound=energy_bound,
-                               forward_bound=forward_bound, exact_rank=truth.rank)  # fmt: skip
+        known = math.nan, energy_bound, math.nan, math.nan, forward_bound, math.nan
+        return _row(method, _verdict_of(error), known, exact_rank=truth.rank, note=str(error))
 
     def measured(v_plus: Floats) -> tuple[str, float, float, float]:
         """Return the verdict, the energy gain, the restitution residual and the distance from the truth."""
@@ -215,10 +235,8 @@ def judge_impact(case: HardCase, method: str) -> HardCaseVerdict:
         verdict = DEPENDS_ON_ROUNDING
     if verdict == STABLE:
         fault = max(smallest_fault(partial(is_seen, wrong)) for wrong in faulty_answers(case, answer.velocity))
-    return HardCaseVerdict(
-        case.name, method, verdict, "", gain, energy_bound, residual, distance, forward_bound, answer.rank, truth.rank,
-        answer.clamp, answer.seconds, fault,
-    )  # fmt: skip
+    numbers = gain, energy_bound, residual, distance, forward_bound, fault
+    return _row(method, verdict, numbers, answer.rank, truth.rank, answer.seconds)
 
 
 def allowed_error(case: HardCase) -> float:
@@ -252,21 +270,21 @@ def resolve_once(case: HardCase, method: str) -> Answer:
     """Resolve and time one impact; with friction by the engine's law, or by Newton's and Coulomb's laws alone."""
     given = case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution
     rank: int | None
-    started, rank, clamp = time.perf_counter(), None, np.nan
+    started, rank = time.perf_counter(), None
     if isinstance(case, FrictionalCase) and method == NEWTON_COULOMB:
         velocity, rank = np.array([float(x) for x in case.impact.velocity(1)]), 1
     elif isinstance(case, FrictionalCase):
         rubbed = resolve_frictional_impact(*given[:2], case.tangent, case.velocity, float(given[3]), case.friction)
-        velocity, rank, clamp = rubbed.velocity, 1, rubbed.clamp
+        velocity, rank = rubbed.velocity, 1
     elif method in COMPARED:
         velocity = COMPARED[method](*given)
     else:
         impact = resolve_impact(*given, clamp=None if method == "factored" else False)
-        velocity, rank, clamp = impact.velocity, impact.rank, impact.clamp
+        velocity, rank = impact.velocity, impact.rank
     seconds = time.perf_counter() - started
     if method in COMPARED and not np.isfinite(velocity).all():
         raise RangeError("velocity", f"{method} works on the numbers as given")
-    return Answer(velocity, rank, clamp, seconds)
+    return Answer(velocity, rank, seconds)
 
 
 @cache

@@ -77,7 +77,7 @@ def test_restitution_is_read_from_the_record_of_the_collisions() -> None:
     stronger = replace(found, v_plus=found.v_plus + 0.1 * (found.v_plus - found.v_minus))
     faulty = replace(run, impacts=stronger)
     assert restitution_residual(faulty) == pytest.approx(0.1 / 1.1)
-    assert judge_hard_case(case, "IAPB", lambda scene, world: faulty).verdict == "restitution unmet"
+    assert judge_hard_case(case, "IAPB", lambda scene, world: faulty)["outcome"] == "restitution unmet"
     assert np.isnan(restitution_residual(run_in_world(case.scene, "PB")))
 
 
