@@ -3,7 +3,7 @@
 `read_problem(path)` chooses the format by the ending of the file's name:
 
 - .lcp, .lcp.gz (lcpy): n, M (n x n, row by row) and q of the LCP  0 <= z ⟂ M z + q >= 0.
-- .dat (Siconos): size, storage flag 0, four sizes, then M **column by column**, q, and a remark. Only by columns does
+- .dat (Siconos): size, storage flag 0, four sizes, then M **column by column** and q. Only by columns does
   `lcp_Pang_isolated_sol` have a solution, and `lcp_CPS_2` equal example 4.4.7 of Cottle, Pang, Stone (1992).
 - .txt (OpenSurgSim): a labelled MLCP with constraint types, E, HCHt, friction and stored lambda; bilateral constraints
   of one to three dimensions and frictionless unilateral ones are read.
@@ -31,7 +31,7 @@ from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from iapb.lazy import needed
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
-from reference.hdf5 import Budget, check_items, check_size, read_dataset
+from reference.hdf5 import Budget, check_items, read_dataset
 
 LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
 LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only
@@ -61,7 +61,6 @@ class StoredProblem:
 
     problem: ImpactProblem
     stored_impulse: Floats | None = None  #: (n,) multipliers in the file
-    remark: str = ""  #: text in the file
 
 
 def read_problem(path: Path | str, budget: int | None = None) -> StoredProblem:
@@ -127,22 +126,22 @@ def _lcp(path: Path) -> StoredProblem:
 
 def _siconos_lcp(path: Path) -> StoredProblem:
     n, flag, *words = _text(path).split()
-    sizes, numbers, remark = words[:4], words[4 : 4 + int(n) * (int(n) + 1)], words[4 + int(n) * (int(n) + 1) :]
+    sizes, numbers = words[:4], words[4 : 4 + int(n) * (int(n) + 1)]  # a remark may follow
     if int(flag) != 0 or sizes != [n] * 4:
         raise ValueError(f"storage flag {flag}, sizes {sizes}: expected flag 0 (dense) and four times {n}")
     matrix, q = _square(n, numbers)
-    return StoredProblem(ImpactProblem.from_delassus(matrix.T, q, name=path.name), remark=" ".join(remark))
+    return StoredProblem(ImpactProblem.from_delassus(matrix.T, q, name=path.name))
 
 
 def _mlcp(path: Path) -> StoredProblem:
     fields: dict[str, str] = {}  # of 'label = value' entries, whose bracketed values may span lines
-    label, remark, (text, mark, _) = "", "", _text(path).partition("\n==")
+    label, (text, mark, _) = "", _text(path).partition("\n==")
     if not mark:
         raise ValueError("has no end mark '== END ==': cut off, or not an MLCP file")
     for line in text.splitlines():
         if line.startswith("#"):
-            remark = line.lstrip("# ").strip()
-        elif " =" in line and not line.startswith(" "):
+            continue
+        if " =" in line and not line.startswith(" "):
             label, _, value = (part.strip() for part in line.partition("="))
             fields[label] = value
         elif label:
@@ -152,7 +151,7 @@ def _mlcp(path: Path) -> StoredProblem:
     w, q = _square(str(len(words["E"])), words["HCHt"] + words["E"])
     joints = bilateral if bilateral.any() or len(bilateral) != len(q) else None
     problem = ImpactProblem.from_delassus(w, q, bilateral=joints, name=path.name)
-    return StoredProblem(problem, np.array(words["lambda"], np.float64), remark)
+    return StoredProblem(problem, np.array(words["lambda"], np.float64))
 
 
 def _fclib(path: Path, allowed: int | None) -> StoredProblem:
@@ -173,11 +172,7 @@ def _fclib(path: Path, allowed: int | None) -> StoredProblem:
             problem = ImpactProblem.from_delassus(w, _numbers(budget, group, "vectors/q"), **given)
         r = _numbers(budget, file, "solution/r") if "solution/r" in file else np.zeros(0)
         stored = r if r.any() and len(r) == problem.size else None  # zeros are a placeholder, not a solution
-        title = ""
-        if "info/title" in group:
-            check_size(group["info/title"], budget)
-            title = bytes(group["info/title"][()]).decode("utf-8", "replace").rstrip("\0")
-        return StoredProblem(problem, stored, " ".join(title.split()))
+        return StoredProblem(problem, stored)
 
 
 def _condensed(budget: Budget, group: Any, given: dict[str, Any]) -> ImpactProblem:

@@ -60,7 +60,7 @@ def solve(task: Any) -> dict[str, Any]:
 
 
 def simulate(task: Any) -> dict[str, Any]:
-    """Return the samples [time, contacts, [[q, twist] per body]] and the largest residual of the solver."""
+    """Return the samples [time, [[q, twist] per body]] and the largest residual of the solver."""
     sk, sn = import_module("siconos.kernel"), import_module("siconos.numerics")
     kept: list[Any] = []  # objects that Siconos only refers to
     model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
@@ -69,17 +69,17 @@ def simulate(task: Any) -> dict[str, Any]:
         model.insertDynamicalSystem(body)
     simulation, solver = _simulation(sk, sn, task, model, kept)
     samples: list[Any] = []
-    worst, steps, size, last = 0.0, 0, 0, round(task["duration"] / task["step"])
+    worst, steps, last = 0.0, 0, round(task["duration"] / task["step"])
     while True:
         if steps % task["stride"] == 0 or steps == last:
             states = [[body.q().tolist(), body.twist().tolist()] for body in bodies]
-            samples.append([steps * task["step"], size, states])
+            samples.append([steps * task["step"], states])
         if steps == last or not simulation.hasNextEvent():
             return {"samples": samples, "residual": worst}
         simulation.computeOneStep()
         simulation.nextStep()
-        steps, size = steps + 1, int(solver.getSizeOutput()) // 3
-        if size:
+        steps += 1
+        if solver.getSizeOutput():
             worst = max(worst, float(solver.numericsSolverOptions().dparam[sn.SICONOS_DPARAM_RESIDU]))
 
 

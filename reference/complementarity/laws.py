@@ -107,23 +107,10 @@ def coulomb_ccp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
     return newton_lcp(replace(problem, relaxed=True), solver)
 
 
-@dataclass(frozen=True)
-class NonNegativeImpulse:
-    """Non-negative impulses whose Jᵀp is nearest to a generalized impulse."""
+def pulling_share(contact_jacobian: ArrayLike, generalized_impulse: ArrayLike, mass_matrix: ArrayLike) -> float:
+    """Return the least |L⁻¹(Jᵀp − given)| / |L⁻¹ given| over all p >= 0, for J (c, d), given (d,) and M = L Lᵀ (d, d).
 
-    impulse: Floats  #: (c,) p >= 0 [N s]
-    residual: float  #: |L⁻¹(Jᵀp − given)| / |L⁻¹ given| in the kinetic metric
-
-    @property
-    def exists(self) -> bool:
-        """Whether the residual is zero up to rounding, so that p gives the same motion without pulling."""
-        return self.residual <= EXPLAINED
-
-
-def nonnegative_impulse(contact_jacobian: ArrayLike, generalized_impulse: ArrayLike,
-                        mass_matrix: ArrayLike) -> NonNegativeImpulse:  # fmt: skip
-    """Return p >= 0 with Jᵀp nearest to `generalized_impulse` (d,), for J (c, d) and M (d, d).
-
+    If it is at most EXPLAINED, some p gives the same motion without pulling.
     Source: Lawson and Hanson, Solving Least Squares Problems (1974), by `scipy.optimize.nnls`.
 
     Raises
@@ -140,13 +127,12 @@ def nonnegative_impulse(contact_jacobian: ArrayLike, generalized_impulse: ArrayL
     columns, goal = np.linalg.solve(cholesky, rows.T), np.linalg.solve(cholesky, given)
     size, length = float(np.linalg.norm(goal)), np.linalg.norm(columns, axis=0)
     if size == 0.0 or len(rows) == 0:
-        return NonNegativeImpulse(np.zeros(len(rows)), 0.0 if size == 0.0 else 1.0)
+        return 0.0 if size == 0.0 else 1.0
     unit = np.where(length > 0.0, length, 1.0)
     try:
-        scaled, residual = nnls(columns / unit, goal / size)
+        return float(nnls(columns / unit, goal / size)[1])
     except RuntimeError as error:
         raise SolverError(f"non-negative least squares: {error}") from error
-    return NonNegativeImpulse(scaled * size / unit, float(residual))
 
 
 def adhesion(contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: ArrayLike) -> str:
@@ -155,7 +141,7 @@ def adhesion(contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: Arra
     if p.min(initial=0.0) >= -ROUNDING * np.abs(p).max(initial=0.0):
         return NONE
     given = np.asarray(contact_jacobian, np.float64).T @ p
-    return ARTEFACT if nonnegative_impulse(contact_jacobian, given, mass_matrix).exists else ADHESIVE
+    return ARTEFACT if pulling_share(contact_jacobian, given, mass_matrix) <= EXPLAINED else ADHESIVE
 
 
 def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from reference.simulators.scene import Cuboid, FixedScene, Obstacle, RigidBody, Sphere
 from reference.simulators.simulator import Settings, Simulator
-from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
+from reference.simulators.trajectory import Samples, Trajectory, steps_between_samples
 
 DEFAULT_STEP = 1.0 / 240.0  # [s]
 DEFAULT_ERP = 0.2  # share of an overlap that the solver removes in a step
@@ -46,12 +46,12 @@ class Bullet(Simulator):
         for wall in scene.obstacles:
             _add(bullet, wall, settings.options)
         bodies = [_add(bullet, body, settings.options) for body in scene.bodies]
-        record, stride, last = Recorder(), steps_between_samples(step), round(duration / step)
+        record, stride, last = Samples(), steps_between_samples(step), round(duration / step)
         for k in range(last + 1):
             if k % stride == 0 or k == last:
                 x, turn = zip(*map(bullet.getBasePositionAndOrientation, bodies), strict=True)
                 v, spin = zip(*map(bullet.getBaseVelocity, bodies), strict=True)
-                record.add(k * step, x, turn, v, spin, len(bullet.getContactPoints()))
+                record.add(k * step, x, turn, v, spin)
             if k < last:
                 bullet.stepSimulation()
         return record.trajectory()

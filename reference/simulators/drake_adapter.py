@@ -9,7 +9,7 @@ import numpy as np
 
 from reference.simulators.scene import FixedScene, Obstacle, RigidBody, Sphere
 from reference.simulators.simulator import Settings, Simulator, viscous_dissipation_for
-from reference.simulators.trajectory import SAMPLE_INTERVAL, Recorder, Trajectory
+from reference.simulators.trajectory import SAMPLE_INTERVAL, Samples, Trajectory
 
 STEP = 1e-3  # [s] its default for discrete plants
 NO_RESTITUTION = "no coefficient e: a stiffness and, for e < 1, Hunt and Crossley's damping at the known speed stand in"
@@ -60,15 +60,14 @@ class Drake(Simulator):
             plant.SetFreeBodyPose(context, made, _pose(drake, body))
             plant.SetFreeBodySpatialVelocity(context, made, drake.SpatialVelocity(body.spin, body.velocity))
         simulator.Initialize()
-        record, interval = Recorder(), max(step, SAMPLE_INTERVAL)
+        record, interval = Samples(), max(step, SAMPLE_INTERVAL)
         for k in range(round(duration / interval) + 1):
             simulator.AdvanceTo(k * interval)
             places = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
             speeds = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
             wxyz = np.array([place.rotation().ToQuaternion().wxyz() for place in places])
             record.add(k * interval, [place.translation() for place in places], wxyz[:, [1, 2, 3, 0]],
-                       [speed.translational() for speed in speeds], [speed.rotational() for speed in speeds],
-                       plant.get_contact_results_output_port().Eval(context).num_point_pair_contacts())  # fmt: skip
+                       [speed.translational() for speed in speeds], [speed.rotational() for speed in speeds])
         return record.trajectory()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from iapb.errors import IapbError
 from reference.simulators.scene import UPRIGHT, Cuboid, FixedScene, Quaternion, Sphere, rotation
 from reference.simulators.simulator import Settings, Simulator, damping_for
-from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
+from reference.simulators.trajectory import Samples, Trajectory, steps_between_samples
 
 NO_RESTITUTION = "no coefficient e: a spring and damper per contact, stiff enough to part impacts, stand in for it"
 OWN_STEP, STACK_STEP, DEFAULT_STEP = 1e-5, 2e-5, 2e-3  # [s] for bouncing, for the stack, and the engine's default
@@ -58,7 +58,7 @@ class MuJoCo(Simulator):
             state.qpos[7 * k : 7 * k + 7] = [*body.position, body.orientation[3], *body.orientation[:3]]
             state.qvel[6 * k : 6 * k + 3] = body.velocity
             state.qvel[6 * k + 3 : 6 * k + 6] = rotation(body.orientation).T @ np.array(body.spin)
-        record, stride = Recorder(), steps_between_samples(step)
+        record, stride = Samples(), steps_between_samples(step)
         for k in range(round(duration / step) // stride + 1):
             if k:
                 mujoco.mj_step(model, state, stride)
@@ -67,7 +67,7 @@ class MuJoCo(Simulator):
             places, speeds = state.qpos.reshape(-1, 7), state.qvel.reshape(-1, 6)
             turns = places[:, [4, 5, 6, 3]]
             spin = np.einsum("bij,bj->bi", rotation(turns), speeds[:, 3:])
-            record.add(state.time, places[:, :3], turns, speeds[:, :3], spin, int(state.ncon))
+            record.add(state.time, places[:, :3], turns, speeds[:, :3], spin)
         return record.trajectory()
 
 

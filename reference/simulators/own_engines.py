@@ -41,8 +41,7 @@ class ImpulseAugmentedEngine(Simulator):
         if not run.complete:
             raise IapbError(run.stopped)
         keep = slice(None, None, steps_between_samples(step))
-        touching = np.append(np.diff(run.contacts.offsets), 0)
-        return Trajectory(run.time[keep], *world_state(run.q[keep], run.v[keep]), touching[keep])
+        return Trajectory(run.time[keep], *world_state(run.q[keep], run.v[keep]))
 
 
 class RigidWorld(ImpulseAugmentedEngine):

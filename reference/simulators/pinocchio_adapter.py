@@ -14,7 +14,7 @@ from reference.rigid_body import model_of
 from reference.simulators.own_engines import own_scene, world_state
 from reference.simulators.scene import FixedScene
 from reference.simulators.simulator import Settings, Simulator
-from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
+from reference.simulators.trajectory import Samples, Trajectory, steps_between_samples
 
 STEP = 1e-3  # [s] Pinocchio has no default step
 DAMPING, DAMPING_OF_A_STACK = 1e-12, 1e-8  # [1/kg] the best of 0, 1e-14, 1e-12, 1e-10, 1e-8 and 1e-6 on these scenes
@@ -44,7 +44,7 @@ class Pinocchio(Simulator):
         model = model_of(system.mechanism).model
         model.gravity.linear = np.array(scene.gravity)
         memory, nothing = model.createData(), np.zeros(model.nv)
-        record, stride = Recorder(), steps_between_samples(step)
+        record, stride = Samples(), steps_between_samples(step)
         for k in range(round(duration / step)):
             v = v + step * pinocchio.aba(model, memory, q, v, nothing)
             found = find_rows(system, q, v, 0.0)
@@ -52,7 +52,7 @@ class Pinocchio(Simulator):
             if len(rows):
                 v = np.array(pinocchio.impulseDynamics(model, memory, q, v, rows, scene.restitution, damping))
             if k % stride == 0:
-                record.add(k * step, *world_state(q, v), len(found.gap))
+                record.add(k * step, *world_state(q, v))
             q = pinocchio.integrate(model, q, step * v)
-        record.add(duration, *world_state(q, v), len(found.gap))
+        record.add(duration, *world_state(q, v))
         return record.trajectory()

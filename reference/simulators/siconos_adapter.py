@@ -10,7 +10,7 @@ from iapb.errors import IapbError, MissingDependencyError, SolverError
 from reference.siconos_bridge import INSTALL, ask
 from reference.simulators.scene import FixedScene, rotation
 from reference.simulators.simulator import Settings, Simulator
-from reference.simulators.trajectory import Recorder, Trajectory, steps_between_samples
+from reference.simulators.trajectory import Samples, Trajectory, steps_between_samples
 
 STEP = 1e-3  # [s]
 # Relative residual of the solver above which a step is invalid; Siconos only prints a warning. Gauss-Seidel converges
@@ -46,10 +46,10 @@ class Siconos(Simulator):
                      "restitution": scene.restitution}, longest=None)  # fmt: skip
         if found["residual"] > CONVERGED:
             raise IapbError(f"Siconos' solver left a residual of {found['residual']:.1e}")
-        record = Recorder()
-        for time, contacts, states in found["samples"]:
+        record = Samples()
+        for time, states in found["samples"]:
             q, twist = (np.array(part, np.float64) for part in zip(*states, strict=True))
             turn = q[:, [4, 5, 6, 3]]
             spin = np.einsum("bij,bj->bi", rotation(turn), twist[:, 3:])
-            record.add(time, q[:, :3], turn, twist[:, :3], spin, contacts)
+            record.add(time, q[:, :3], turn, twist[:, :3], spin)
         return record.trajectory()

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from reference.simulators.scene import Cuboid, FixedScene, Floats, Sphere, rotation
 
 SAMPLE_INTERVAL = 1e-3  # [s] interval of kept states; longer steps are all kept
+INSTANTS = 2000
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,6 @@ class Trajectory:
     orientation: Floats  #: (n, b, 4) x, y, z, w
     velocity: Floats  #: (n, b, 3) [m/s]
     spin: Floats  #: (n, b, 3) [rad/s]
-    contacts: NDArray[np.int64]  #: (n,) number of touching points that the engine reports, −1 if it reports none
 
     @property
     def finite(self) -> bool:
@@ -40,22 +40,17 @@ class Trajectory:
         """Return the potential energy of gravity (n,) [J], which is zero at the world's origin."""
         return np.asarray(-np.einsum("b,nbi,i->n", scene.masses, self.position, np.array(scene.gravity)))
 
-    def momentum(self, scene: FixedScene) -> Floats:
-        """Return the momentum (n, 3) [N s]."""
-        return np.asarray(np.einsum("b,nbi->ni", scene.masses, self.velocity))
 
-
-class Recorder:
+class Samples:
     """Collects the states in an adapter's loop."""
 
     def __init__(self) -> None:
         self._rows: list[tuple[Any, ...]] = []
 
-    def add(self, time: float, position: ArrayLike, orientation: ArrayLike, velocity: ArrayLike, spin: ArrayLike,
-            contacts: int) -> None:  # fmt: skip
+    def add(self, time: float, position: ArrayLike, orientation: ArrayLike, velocity: ArrayLike, spin: ArrayLike
+            ) -> None:
         """Keep copies of the arrays (b, 3), (b, 4), (b, 3), (b, 3) of one instant."""
-        states = (np.array(part) for part in (position, orientation, velocity, spin))
-        self._rows.append((time, *states, contacts))
+        self._rows.append((time, *(np.array(part) for part in (position, orientation, velocity, spin))))
 
     def trajectory(self) -> Trajectory:
         """Return the trajectory of all kept instants."""
@@ -67,13 +62,13 @@ def steps_between_samples(step: float) -> int:
     return max(1, round(SAMPLE_INTERVAL / step))
 
 
-def deepest_overlap(scene: FixedScene, motion: Trajectory, instants: int = 2000) -> float:
-    """Return the largest overlap [m] of shapes at up to so many instants of the motion.
+def deepest_overlap(scene: FixedScene, motion: Trajectory) -> float:
+    """Return the largest overlap [m] of shapes at up to INSTANTS instants of the motion.
 
     This measure is the same for all engines and uses positions alone: for balls the distance, for boxes the smallest
     overlap along the normals of their faces (separating axes; edge axes are not needed for faces in contact).
     """
-    every = max(1, len(motion.time) // instants)
+    every = max(1, len(motion.time) // INSTANTS)
     frames: list[tuple[Any, Floats, Floats]] = [
         (body.shapes, motion.position[::every, k], rotation(motion.orientation[::every, k]))
         for k, body in enumerate(scene.bodies)]  # fmt: skip

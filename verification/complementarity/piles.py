@@ -20,7 +20,7 @@ import numpy as np
 
 from iapb import resolve_impact
 from iapb.errors import SolverError
-from reference.complementarity.laws import newton_lcp, nonnegative_impulse
+from reference.complementarity.laws import EXPLAINED, newton_lcp, pulling_share
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import DatasetError, problem_files, read_problem
 from verification.check import Check, Study
@@ -109,7 +109,7 @@ def compare_pile(case: ImpactCase, rows: str = "approaching") -> Row:
     distance = case.distance(equal.velocity, push.velocity)
     agrees, asked = distance <= PUSHED, len(given) <= 4 * ASKED and len(v) <= 3 * ASKED
     pulls = float(np.mean(p < -PULLS * np.abs(p).max(initial=0.0))) if len(p) else 0.0
-    contradicted = asked and nonnegative_impulse(given, equal.generalized_impulse, mass).exists != agrees
+    contradicted = asked and (pulling_share(given, equal.generalized_impulse, mass) <= EXPLAINED) != agrees
     values = (len(given), len(given) - equal.rank, agrees, len(given) * agrees, pulls,
               float(-p[p < 0.0].sum() / (np.abs(p).sum() or 1.0)), distance, case.distance(push.velocity, law),
               1e6 * equality, 1e6 * pushing, contradicted, push.energy_change / (0.5 * case.speed**2))  # fmt: skip

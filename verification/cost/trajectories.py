@@ -368,7 +368,7 @@ class Judge:
 
     def _at(self, times: Floats) -> Trajectory:
         q, v = self.truth.state(times)
-        return Trajectory(times, *world_state(q, v), np.full(len(times), -1))
+        return Trajectory(times, *world_state(q, v))
 
 
 def _fixed(scene: FixedScene, step: float) -> dict[str, Any]:
@@ -398,7 +398,7 @@ def _compiled(law_name: str, integrator: str, walls: Callable[[FixedScene, float
         run = loop.recording.run("", "")
         keep = slice(None, None, steps_between_samples(step))
         q, v = run.q[keep], run.v[keep]
-        return Trajectory(run.time[keep], *world_state(q, v), np.full(len(q), -1)), seconds, 0.0
+        return Trajectory(run.time[keep], *world_state(q, v)), seconds, 0.0
 
     return run
 

@@ -48,7 +48,7 @@ def test_truth_of_every_impact_scene_keeps_its_energy(name):
 def test_impacts_conserve_energy_and_momentum_in_the_cradle(name):
     scene = fixed_scene("elastic_cradle")
     motion = run(name, scene)
-    energy, momentum = motion.kinetic_energy(scene), motion.momentum(scene)
+    energy, momentum = motion.kinetic_energy(scene), np.einsum("b,nbi->ni", scene.masses, motion.velocity)
     np.testing.assert_allclose(energy, energy[0], rtol=ROUNDING)
     np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), atol=ROUNDING)
     np.testing.assert_allclose(motion.velocity[-1], scene.final_velocities, atol=ROUNDING)
@@ -65,7 +65,6 @@ def test_box_stays_at_rest(name):
     scene = fixed_scene("resting_box")
     motion = run(name, scene, step=1e-3, duration=0.2)
     assert np.abs(motion.position - motion.position[0]).max() < 1e-3
-    assert motion.contacts.max() >= 3  # it stands on something
 
 
 @pytest.mark.parametrize("name", ["rigid", "pinocchio"])
@@ -84,7 +83,7 @@ def test_overlap_is_measured_alike_for_balls_and_boxes():
     place = np.array([[body.position for body in balls.bodies]])
     near = place - [[[0.0, 2e-3, 0.0], [0.0, 2e-3, 0.0], [0.0, 0.0, 0.0]]]  # upper ball 2 mm into the lower one
     turn = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (1, 3, 4))
-    motion = Trajectory(np.zeros(1), near, turn, np.zeros((1, 3, 3)), np.zeros((1, 3, 3)), np.zeros(1, np.int64))
+    motion = Trajectory(np.zeros(1), near, turn, np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
     assert deepest_overlap(balls, motion) == pytest.approx(2e-3, rel=1e-9)
 
 
