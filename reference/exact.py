@@ -79,8 +79,8 @@ def exact_impact(
         rows = type(mass)(len(chosen), mass.ncols(), [jacobian[i, j] for i in chosen for j in range(mass.ncols())])
         impulse = rows.transpose() * (rows * mass.solve(rows.transpose())).solve(rows * v) * -(1 + e)
     v_plus = v + mass.solve(impulse)
-    before, after = (_fractions(x.transpose() * mass * x)[0] / 2 for x in (v, v_plus))
-    return ExactImpact(_fractions(v_plus), _fractions(impulse), chosen, before, after)
+    before, after = (fractions_of(x.transpose() * mass * x)[0] / 2 for x in (v, v_plus))
+    return ExactImpact(fractions_of(v_plus), fractions_of(impulse), chosen, before, after)
 
 
 def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
@@ -99,7 +99,7 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
     given = rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus)
-    before, after = (_fractions(x.transpose() * mass * x)[0] for x in given)
+    before, after = (fractions_of(x.transpose() * mass * x)[0] for x in given)
     if before == 0:
         return 0.0 if after == 0 else np.inf
     try:
@@ -139,8 +139,9 @@ def rational_matrix(argument: str, value: ArrayLike, columns: int | None = None)
     return flint.fmpq_mat(*array.shape, [flint.fmpq(x.numerator, x.denominator) for x in fractions])
 
 
-def _fractions(column: Rational) -> tuple[Fraction, ...]:
-    return tuple(Fraction(int(x.p), int(x.q)) for x in column.entries())
+def fractions_of(matrix: Rational) -> tuple[Fraction, ...]:
+    """Return the entries of a rational matrix."""
+    return tuple(Fraction(int(x.p), int(x.q)) for x in matrix.entries())
 
 
 def _nonzero_eigenvalues(matrix: Rational) -> list[float]:

@@ -16,7 +16,7 @@ from iapb.errors import IapbError, MissingDependencyError
 from reference.simulators import FIXED_SCENES, SIMULATORS, FixedScene, Trajectory, find_simulator, fixed_scene
 from reference.simulators.trajectory import deepest_overlap
 from verification.check import Check, Study, Topic
-from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, check_depth, counted, of_each
+from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Part, counted, of_each
 from verification.table import Row, Table
 
 OWN, MATCHED = SETTINGS = ("own", "matched")
@@ -60,7 +60,7 @@ class EngineRecord:
 
 
 def compare_engines(
-    engines: Sequence[str] | None = None, scenes: Sequence[str] | None = None, depth: str = "full",
+    engines: Sequence[str] | None = None, scenes: Sequence[str] | None = None,
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
 ) -> list[EngineRecord]:
     """Run every engine on every scene at both choices of settings.
@@ -68,14 +68,12 @@ def compare_engines(
     Parameters
     ----------
     engines, scenes : names; by default all. An engine that is not installed gets records that say so.
-    depth : "full", or "quick" with shorter resting scenes
     failures : receives exceptions outside of the other engines; an exception of another engine in a run is a result
 
     If an engine's own settings equal the matched ones, one run gives both records.
     """
-    check_depth(depth)
     pairs = list(product(engines or SIMULATORS, scenes or FIXED_SCENES))
-    return list(of_each(counted(pairs, progress) if progress else pairs, lambda pair: _both(*pair, depth), failures,
+    return list(of_each(counted(pairs, progress) if progress else pairs, lambda pair: _both(*pair, "full"), failures,
                         lambda pair: f"{pair[0]} on {pair[1]}"))  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from reference.complementarity.solvers.sweeps import settles
 from reference.exact import exact_impact
 
 Floats = NDArray[np.floating[Any]]
+EPS = float(np.finfo(float).eps)
 
 # Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly motion. A correct
 # resolver may treat them as either, so laws that compare velocities skip such impacts.

@@ -13,9 +13,7 @@ import numpy as np
 
 from iapb.contact.kernels.impact import rank_tolerance
 from iapb.errors import ArgumentError
-from verification.impacts import Floats, ImpactCase
-
-_EPS = float(np.finfo(float).eps)
+from verification.impacts import EPS, Floats, ImpactCase
 
 
 def gram_pinv(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -30,7 +28,7 @@ def gram_cholesky(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     W = J @ push
     length, scale = np.sqrt(np.maximum(np.diag(W), 0.0)), np.sqrt(np.diag(M))
     # The solution with M leaves the smallest eigenvalue of the Gram matrix of unit rows known to c·ε·κ only.
-    known = 8.0 * len(J) * _EPS * np.linalg.cond(M / np.outer(scale, scale))
+    known = 8.0 * len(J) * EPS * np.linalg.cond(M / np.outer(scale, scale))
     if not length.all() or np.linalg.eigvalsh(W / np.outer(length, length)).min(initial=1.0) <= known:
         raise ArgumentError("contact_jacobian", J.shape, "independent rows for method 'gram_cholesky'")
     root = np.linalg.cholesky(0.5 * (W + W.T))

@@ -13,19 +13,17 @@ import numpy as np
 from iapb import resolve_impact
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
-from reference.exact import bulk_energy_gain, exact_impact, rational_matrix
+from reference.exact import bulk_energy_gain, exact_impact, fractions_of, rational_matrix
 from reference.worlds import run_world
 from verification.check import Check, Study
 from verification.claims.conditions import START, Condition, start_conditions
 from verification.claims.peg import place, trace
 from verification.finding import BEYOND, MISPRINT
-from verification.impacts import Family, Floats, ImpactCase, approaching, draw_of_rank, whole_numbers
+from verification.impacts import EPS, Family, Floats, ImpactCase, approaching, draw_of_rank, whole_numbers
 from verification.methods import gram_cholesky, gram_pinv
 from verification.proofs.cases import pseudo_inverse
 from verification.scenes.measures import COORDINATES
 from verification.table import Row, Table
-
-EPSILON = float(np.finfo(np.float64).eps)
 
 
 class Batch(NamedTuple):
@@ -113,12 +111,12 @@ def worst(values: Iterable[float]) -> float:
 
 def energy_bound(batch: Batch) -> float:
     """Relative energy gain that rounding alone may cause: 10 d ε √κ(M), the bound that the resolver documents."""
-    return 10.0 * batch.family.coordinates * EPSILON * float(np.sqrt(batch.family.condition_number))
+    return 10.0 * batch.family.coordinates * EPS * float(np.sqrt(batch.family.condition_number))
 
 
 def solve_bound(batch: Batch) -> float:
     """Relative error allowed for quantities computed with one solve with M or with W: 100 d ε κ(M)."""
-    return 100.0 * batch.family.coordinates * EPSILON * batch.family.condition_number
+    return 100.0 * batch.family.coordinates * EPS * batch.family.condition_number
 
 
 def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
@@ -217,7 +215,7 @@ def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Me
 
     def bound(batch: Batch) -> float:  # both methods solve with M and with W
         condition = max(batch.family.condition_number, *(np.linalg.cond(_delassus(case)) for case in batch.impacts))
-        return float(100.0 * batch.family.coordinates * EPSILON * condition)
+        return float(100.0 * batch.family.coordinates * EPS * condition)
 
     return Measure(lambda batch: worst(distance(case, batch.restitution) for case in batch.impacts), bound)
 
@@ -237,7 +235,7 @@ def _by_pseudo_inverse(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
     mass, rows, v, factor = (rational_matrix("impact", array) for array in (*case.arrays, np.array([1 + e])))
     impulse = pseudo_inverse(rows * mass.solve(rows.transpose())) * (rows * v) * factor
     after = v - mass.solve(rows.transpose() * impulse)
-    return [Fraction(str(x)) for x in after.entries()], exact_impact(*case.arrays, e).velocity
+    return fractions_of(after), exact_impact(*case.arrays, e).velocity
 
 
 C03 = batches(
@@ -358,7 +356,7 @@ C06 = batches(
     families=_CHANGES, restitutions=(0.0, 0.7), impacts={"quick": 12, "full": 150}, exact=(_CHANGES[::2], 0.5),
     parts={
         "random change of coordinates, in doubles": Measure(_coordinates_apart, lambda batch: (
-            100.0 * batch.family.coordinates * EPSILON * MASS_CONDITION * batch.family.condition_number**2)),
+            100.0 * batch.family.coordinates * EPS * MASS_CONDITION * batch.family.condition_number**2)),
         "shear by whole numbers, in rationals": _differing(_sheared),
     },
     draw=lambda family, *given: draw_of_rank(family._replace(condition_number=MASS_CONDITION), *given),
@@ -391,7 +389,7 @@ def _random_or_peg(study: Study, case: tuple[Any, ...]) -> Any:
     return {"part": case[0], "coordinates": 3, "restitution": 0.0,
             "impacts": sum(len(one.impact_step) for one in traces),
             "error": worst(gain for one in traces for gain in -one.energy_lost / one.kinetic_energy[one.impact_step]),
-            "bound": 100.0 * EPSILON}  # fmt: skip
+            "bound": 100.0 * EPS}  # fmt: skip
 
 
 C08 = replace(_PASSIVE, row=_random_or_peg,

@@ -20,7 +20,6 @@ from verification.hard_cases.exact import FrictionalImpact, exact_poisson
 from verification.impacts import Floats
 
 Exact = NDArray[np.object_] | Floats
-EPS = float(np.finfo(float).eps)
 
 NEWTON_COULOMB = "Newton with Coulomb"  # Newton's law with Coulomb friction, as in Kane and Levinson
 COULOMB = "ideal with friction"  # the rigid world with Coulomb friction; the paper's rigid worlds have none

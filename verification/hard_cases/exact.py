@@ -16,14 +16,9 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from iapb.errors import SolverError
-from reference.exact import Rational, rational_matrix
+from reference.exact import Rational, fractions_of, rational_matrix
 
 _ROOT_BITS = 400  # the error of α is at most 2⁻³⁸⁰, far below the precision of doubles
-
-
-def fractions_of(matrix: Rational) -> tuple[Fraction, ...]:
-    """Return the entries of a rational matrix."""
-    return tuple(Fraction(int(x.p), int(x.q)) for x in matrix.entries())
 
 
 def exact_poisson(

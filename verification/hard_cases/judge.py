@@ -30,14 +30,13 @@ from iapb.errors import IapbError, RangeError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
-from reference.exact import rational_matrix, relative_energy_gain
+from reference.exact import fractions_of, rational_matrix, relative_energy_gain
 from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
 from reference.worlds import require_complete, run_world
 from verification.hard_cases.case import (
     COULOMB,
     DEPENDS_ON_ROUNDING,
-    EPS,
     NEWTON_COULOMB,
     RESTITUTION_TOLERANCE,
     STABLE,
@@ -48,7 +47,7 @@ from verification.hard_cases.case import (
     TrajectoryCase,
     smallest_fault,
 )
-from verification.hard_cases.exact import fractions_of
+from verification.impacts import EPS
 from verification.methods import COMPARED
 from verification.table import Row
 

@@ -11,9 +11,8 @@ import numpy as np
 
 from iapb.errors import ArgumentError
 from reference.exact import bulk_energy_gain, relative_energy_gain
-from verification.impacts import Floats, ImpactCase
+from verification.impacts import EPS, Floats, ImpactCase
 
-EPS = float(np.finfo(float).eps)
 CEILING_UP_TO = 1e8  # κ(M) of the kit's own draws
 Measure = TypeVar("Measure", bound=Callable[..., Any])
 Found = tuple[float, float] | None  # value of a residual and its tolerance; None if the law does not apply

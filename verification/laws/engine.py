@@ -19,8 +19,8 @@ from iapb.contact.kernels.collide import largest_share
 from iapb.contact.kernels.resting import normal_force
 from iapb.errors import IapbError
 from iapb.run import Run
-from verification.impacts import Floats, ImpactCase, draw_case, draw_extreme_case
-from verification.laws.bounds import EPS, FACTORED, KIT, Found, Law, LawCount, law, relative_gain
+from verification.impacts import EPS, Floats, ImpactCase, draw_case, draw_extreme_case
+from verification.laws.bounds import FACTORED, KIT, Found, Law, LawCount, law, relative_gain
 from verification.laws.resolver import Resolver, outcome
 from verification.laws.scenes import ROOM, SceneCase, Values, draw_scene
 from verification.stability.device_port import COUPLER_WORLD, RADIUS, DeviceLoop, actuator_forces, leaked

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from verification.impacts import Floats, ImpactCase
-from verification.laws.bounds import EPS, Bounds, Found, Law, law, over, relative_gain
+from verification.impacts import EPS, Floats, ImpactCase
+from verification.laws.bounds import Bounds, Found, Law, law, over, relative_gain
 from verification.laws.resolver import Resolver, outcome, own_answer, own_outcome
 
 LAWS: dict[str, Law] = {}

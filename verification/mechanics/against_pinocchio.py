@@ -32,6 +32,7 @@ from reference.random_mechanisms import random_inertia, random_mechanism, random
 from reference.rigid_body import PinocchioMechanism, impulse_dynamics, model_from_urdf, model_of
 from verification.check import Check, Study
 from verification.finding import NOT_TESTABLE, Part, verdict_of_law
+from verification.impacts import EPS
 from verification.table import Row, Table
 
 # Relative to the largest entry. For chains of 30 links each algorithm is accurate to about 1e-14.
@@ -251,7 +252,6 @@ AGAINST_PINOCCHIO = Check(
     note=f"Largest difference over all states. Tolerance: {TOLERANCE}.",
 )  # fmt: skip
 
-_EPS = float(np.finfo(float).eps)
 _EASY, _HARDEST = 10.0, 1e6  # condition numbers κ(A): up to the first, plain rounding; beyond the second, not compared
 
 
@@ -270,7 +270,7 @@ def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
             continue
         difference = resolve_impact(M, J, v, e).velocity - impulse_dynamics(M, J, v, e)
         error = float(np.linalg.norm(L.T @ difference) / np.linalg.norm(L.T @ v))
-        shares.append(error / (100.0 * d * _EPS * condition**2))
+        shares.append(error / (100.0 * d * EPS * condition**2))
         easy += [error] if condition <= _EASY else []
     yield {"quantity": "v⁺ of independent rows, as a share of 100 d ε κ(A)²", "cases": len(shares),
            "largest difference": max(shares), "tolerance": 1.0,

@@ -21,9 +21,9 @@ from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference import Floats
 from verification.check import Check, Study
+from verification.impacts import EPS
 from verification.table import Row
 
-EPSILON = float(np.finfo(np.float64).eps)
 AGREEMENT = 1e-10  # tolerance relative to the velocity in the kinetic metric, for moderate condition numbers:
 MODERATE = 1e4  # largest kappa(M) and kappa(df/dr)^2 there
 SEPARATED = 0.1  # and least sigma_min of independent rows of unit length
@@ -141,7 +141,7 @@ def compare(
         error = float(np.sqrt((difference @ mass @ difference) / (v @ mass @ v)))
     except IapbError:  # the mass matrix of these coordinates is not positive definite in doubles any more
         error = None
-    bound = CONSTANT * LINKS * EPSILON * kappa * squared / sigma
+    bound = CONSTANT * LINKS * EPS * kappa * squared / sigma
     moderate = kappa <= MODERATE and squared <= MODERATE and sigma >= SEPARATED
     return {"κ(M)": kappa, "κ(∂f/∂r)²": squared, "σ_min": sigma, "error": error, "bound": bound,
             "tolerance": AGREEMENT if moderate else bound}  # fmt: skip

@@ -17,7 +17,6 @@ from reference import Floats
 
 COORDINATES = ("x", "y", "theta")
 HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
-UNITS = {"x": "m", "y": "m", "theta": "rad"}
 
 # The device has settled if it is slower than this in every coordinate: 1 mm/s and 0.01 rad/s are below a hundredth of
 # the peg's speed at contact (0.15 m/s), and a corner of the peg then moves by less than 3 micrometres per step.
