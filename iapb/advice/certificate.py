@@ -24,8 +24,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.run import Run, digests
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.reading import scene_from_values
-
-Floats = NDArray[np.float64]
+from iapb.schema import Booleans, Floats, Integers
 
 EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
@@ -157,7 +156,7 @@ def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, **others: ArrayLike) ->
 class Judged:
     """The exact answers `gained` (n,), and the numbers of impacts that integers decided and confirmed."""
 
-    gained: NDArray[np.bool_]
+    gained: Booleans
     by_integers: int
     checked: int
 
@@ -215,7 +214,7 @@ def certify(run: Run) -> Certificate:
     return _joined([_certify(piece, silent) for piece in _pieces(run, step)])
 
 
-def _pieces(run: Run, step: NDArray[np.int64]) -> Iterator[Any]:
+def _pieces(run: Run, step: Integers) -> Iterator[Any]:
     """Yield what is certified of a run in pieces of limited memory; the arrays of the run may be in a file."""
     steps, first = max(min(_STEPS, _PIECE // (24 * max(run.q.shape[1], 1))), 1), 0
     while first == 0 or first < len(run.impulse):

@@ -18,7 +18,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.advice.solids import joined, solids_of
 from iapb.compiled import block
@@ -29,10 +28,9 @@ from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
 from iapb.scene.parts import LARGEST_NUMBER, STIFFEST, written
-from iapb.schema import zeros_of
+from iapb.schema import Floats, Integers, zeros_of
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]  # numbers of contacts
+Rows = Integers  # numbers of contacts
 
 NEAR = 0.02  # of the smaller shape: contacts closer than this at the start count as touching
 DEEP = 0.02  # of the smaller shape: a larger overlap at the start is more than a resting depth

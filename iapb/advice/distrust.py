@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.advice.solids import Solid, joined, solids_of
 from iapb.mechanics.energy import FORCES, energy_ledger, moved_straight
@@ -22,10 +21,7 @@ from iapb.run import UNSOLVED, Run
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of
 from iapb.scene.model import scene_kind
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Booleans = NDArray[np.bool_]
+from iapb.schema import Booleans, Floats, Integers
 
 UNACCOUNTED = 0.02  # share of the available energy, or of a free momentum, that errors of a first-order step may add
 SWING = 0.1  # the same for the motion of a linkage: its error swings to and fro

@@ -6,12 +6,9 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.contact.geometry import ENDLESS, Shapes
-
-Floats = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
+from iapb.schema import Booleans, Floats, Integers
 
 GRAZED = 0.1  # of a shape's thickness: a path that enters it by less does not pass through it
 
@@ -79,7 +76,7 @@ def solids_of(shapes: Shapes) -> dict[int, Solid]:
     return {i: Solid.of(shapes, i) for i in np.flatnonzero(~np.isin(shapes.kind, ENDLESS)).tolist()}
 
 
-def joined(count: int, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+def joined(count: int, pairs: Iterable[tuple[int, int]]) -> Integers:
     """Return a number for each of `count` things; things that pairs connect have the same one."""
     group = np.arange(count)
     for a, b in pairs:

@@ -25,9 +25,8 @@ from iapb.contact.kernels.resolve import (
 from iapb.errors import ArgumentError, IapbError, RangeError, SolverError
 from iapb.linalg import cholesky
 from iapb.names import one_of
-from iapb.schema import zeros_of
+from iapb.schema import Floats, zeros_of
 
-Floats = NDArray[np.float64]
 Arrays = tuple[Floats, Floats, Floats]  # M (n, d, d), J (n, c, d), v (n, d)
 METHODS = ("factored", "poisson")
 NEWTON, POISSON, COULOMB = "Newton, equality", "Poisson, two LCPs", "Newton, equality, with Coulomb friction"

@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.contact.kernels.step import STATUS_TEXT
 from iapb.contact.kernels.world import State
@@ -19,8 +18,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
-
-Floats = NDArray[np.float64]
+from iapb.schema import Floats
 
 RENDERINGS = ("full", "saturate", "scale", "spread")
 

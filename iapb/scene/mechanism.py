@@ -10,7 +10,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
@@ -22,9 +21,9 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
+from iapb.schema import Floats, Indices, Integers
 
-Floats = NDArray[np.float64]
-Pairs = NDArray[np.int32]
+Pairs = Indices
 
 UNSTATED = 2.0  # larger than any restitution, so that the minimum of two is a given one
 
@@ -199,7 +198,7 @@ def restitutions_of(scene: Scene, pairs: Pairs) -> Floats:
 class Frictions(NamedTuple):
     """Coefficients of friction by class of shape: a table (k, k) for two classes, and the class (n,) of each shape."""
 
-    class_of_shape: NDArray[np.int64]
+    class_of_shape: Integers
     table: Floats
 
     def by_pair(self, pairs: Pairs) -> Floats:
