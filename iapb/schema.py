@@ -1,6 +1,6 @@
 """The schema of recorded quantities and of the kernels' arrays: each is declared once, as a field of its record.
 
-A field ``name: Annotated[Floats, along("step velocity", FORCE, "friction forces")]`` gives an array its name, type,
+A field ``name: Annotated[Floats, quantity("step velocity", FORCE, "friction forces")]`` gives an array its name, type,
 dimensions, unit and meaning. Arrays that are not recorded give the dimensions alone: ``Annotated[Floats, "velocity"]``.
 """
 
@@ -37,7 +37,7 @@ class Quantity(NamedTuple):
     meaning: str
 
 
-def along(dimensions: str, unit: str | dict[str, str] = "1", meaning: str = "") -> Quantity:
+def quantity(dimensions: str, unit: str | dict[str, str] = "1", meaning: str = "") -> Quantity:
     """Return the declaration of an array, for `Annotated`; the field adds name and type."""
     return Quantity("", tuple(dimensions.split()), float, unit, meaning)
 
@@ -51,7 +51,7 @@ def quantities(record: type, first: str = "") -> tuple[Quantity, ...]:
 def _declared(record: Any) -> tuple[Quantity, ...]:
     hints = get_type_hints(record, include_extras=True)
     found = ((name, *get_args(hint)) for name, hint in hints.items() if hasattr(hint, "__metadata__"))
-    return tuple((along(said) if isinstance(said, str) else said)._replace(
+    return tuple((quantity(said) if isinstance(said, str) else said)._replace(
         name=name, dtype=get_args(get_args(kind)[1])[0]) for name, kind, said in found)
 
 

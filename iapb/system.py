@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.advice.checks import settled
+from iapb.advice.checks import chosen_scene
 from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for, facts_of
 from iapb.compiled import Entry, block, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity
@@ -63,7 +63,7 @@ class System:
 
     def __init__(self, scene: Scene) -> None:
         self.given = scene
-        self.scene, self.remarks = settled(scene)
+        self.scene, self.remarks = chosen_scene(scene)
         scene = self.scene
         self.mechanism: Mechanism = scene_parts.mechanism_of(scene)
         self.shapes = scene_parts.shapes_of(scene)

@@ -286,7 +286,7 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
     """
     chosen: Any = laws.ImpulseAugmented() if law is None else law
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
-    start, uses = Start(settled(scene)[0]), frozenset[str](getattr(chosen, "uses", ()))
+    start, uses = Start(chosen_scene(scene)[0]), frozenset[str](getattr(chosen, "uses", ()))
     found = [*_degrees(scene), *_inertias(scene), *_overlaps(start), *_fast(start)]
     if laws.PENALTY in uses:
         found += _sags(start)
@@ -494,7 +494,7 @@ STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
 _UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
 
 
-def settled(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
+def chosen_scene(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with the values that the toolkit chooses, unchanged if there are none, and remarks on them."""
     said: tuple[str, ...] = ()
     if scene.contact.auto:

@@ -111,12 +111,12 @@ def _books(seen: _Seen) -> Iterator[_Book]:
     """Yield the books of the scene, of groups of trees that touch, and of single trees, where there is a balance."""
     run, mechanism, begin = seen.run, seen.mechanism, seen.begin
     trees, ranges, ledgers = mechanism.tree_of_body, mechanism.tree_dofs, dict[int, dict[str, Floats]]()
-    firsts = np.searchsorted(trees, np.arange(len(ranges)))
+    roots = np.searchsorted(trees, np.arange(len(ranges)))
     if {"kinetic", "potential", "hand_work", "coupling_work"} <= set(run.energy):
         yield _balance(seen, run.energy, 0, trees >= 0, "")
     moving = [t for t, (start, stop) in enumerate(ranges) if start < stop and run.steps > begin]
     for t in (t for t in moving if ranges[t] != seen.carried):
-        alone, dofs, q = mechanism.alone(t), slice(*ranges[t]), int(mechanism.arrays.q_start[firsts[t]])
+        alone, dofs, q = mechanism.alone(t), slice(*ranges[t]), int(mechanism.arrays.q_start[roots[t]])
         forces = {name: getattr(run, f"{name}_force")[begin:, dofs] for name in FORCES}
         states = run.q[begin:, q : q + alone.nq], run.v[begin:, dofs]
         impulse = np.ascontiguousarray(run.impulse[begin:, dofs])
@@ -127,7 +127,7 @@ def _books(seen: _Seen) -> Iterator[_Book]:
         members = [t for t in chosen.tolist() if t in moving]
         if members and len(chosen) < len(group) and all(t in ledgers for t in members):
             energy = {name: np.sum([ledgers[t][name] for t in members], axis=0) for name in ledgers[members[0]]}
-            names = [run.body_names[firsts[t]] for t in members[:3]] + ["others"] * (len(members) > 3)
+            names = [run.body_names[roots[t]] for t in members[:3]] + ["others"] * (len(members) > 3)
             yield _balance(seen, energy, begin, np.isin(trees, chosen), " and ".join(names))
     for t, energy in ledgers.items():
         alone, gain = mechanism.alone(t), energy["integration_residual"]
@@ -136,7 +136,7 @@ def _books(seen: _Seen) -> Iterator[_Book]:
         taken = (energy["penalty_work"], energy["friction_work"], -energy["impact_loss"])
         at_hand = _at_hand(energy) + sum(float(work.max(initial=0.0)) for work in taken)
         most = (UNACCOUNTED if steady else SWING) * at_hand + seen.trifle(trees == t)
-        yield _Book(run.body_names[firsts[t]], energy["friction_work"], gain, at_hand, most, alone=True)
+        yield _Book(run.body_names[roots[t]], energy["friction_work"], gain, at_hand, most, alone=True)
 
 
 def _balance(seen: _Seen, energy: dict[str, Floats], begin: int, bodies: Booleans, name: str) -> _Book:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.advice.checks import settled
+from iapb.advice.checks import chosen_scene
 from iapb.contact import laws
 from iapb.contact.geometry import Shapes
 from iapb.haptics.coupling import Coupling
@@ -337,7 +337,7 @@ def decide_effects(
     tuple of Effect
         all effects in a fixed order, each with its state, the reason, and what would change without it.
     """
-    scene, _ = settled(scene)
+    scene, _ = chosen_scene(scene)
     mechanism, shapes = mechanism_of(scene), shapes_of(scene)
     return decide_for(scene, facts_of(scene, mechanism, shapes, pairs_of(scene, shapes)), law, coupling, rendering)
 
@@ -355,7 +355,7 @@ def decide_for(
     scene: Scene, facts: Facts, law: laws.ContactLaw | str | None, coupling: Coupling | str | None,
     rendering: str | None = None,
 ) -> tuple[Effect, ...]:
-    """Do what `decide_effects` does for a settled scene with known facts."""
+    """Do what `decide_effects` does for the scene of `chosen_scene` with known facts."""
     if law is not None and not isinstance(law, str):
         law = law.within(scene) if hasattr(law, "within") else law
         rendering = getattr(law, "rendering", "full") if rendering is None else rendering

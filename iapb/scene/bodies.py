@@ -31,8 +31,8 @@ from iapb.scene.parts import (
     Number,
     OwnFriction,
     OwnRestitution,
-    Part,
     Positive,
+    ScenePart,
     Vector2,
     Vector3,
     require,
@@ -64,7 +64,7 @@ def counted(count: int) -> str:
     return f"{count} number{'' if count == 1 else 's'}"
 
 
-class Box(Part):
+class Box(ScenePart):
     """A rectangle."""
 
     kind: Literal["box"] = Field(description="a rectangle")
@@ -73,7 +73,7 @@ class Box(Part):
     angle: Number = Field(0.0, description="its rotation about the centre [rad], counter-clockwise")
 
 
-class Circle(Part):
+class Circle(ScenePart):
     """A disc."""
 
     kind: Literal["circle"] = Field(description="a disc")
@@ -81,7 +81,7 @@ class Circle(Part):
     center: Center[Vector2] = (0.0, 0.0)
 
 
-class Polygon(Part):
+class Polygon(ScenePart):
     """A convex polygon; its vertices are stored counter-clockwise."""
 
     kind: Literal["polygon"] = Field(description="a convex polygon")
@@ -104,7 +104,7 @@ class Polygon(Part):
         return vertices
 
 
-class Cuboid(Part):
+class Cuboid(ScenePart):
     """A box in space."""
 
     kind: Literal["box"] = Field(description="a cuboid")
@@ -113,7 +113,7 @@ class Cuboid(Part):
     rpy: Vector3 = Field(ORIGIN, description="its rotation about the centre: roll, pitch, yaw [rad]")
 
 
-class Ball(Part):
+class Ball(ScenePart):
     """A sphere."""
 
     kind: Literal["sphere"] = Field(description="a ball")
@@ -121,7 +121,7 @@ class Ball(Part):
     center: Center[Vector3] = ORIGIN
 
 
-class _OfWall(Part):
+class _OfWall(ScenePart):
     name: Name = Field(description="the wall's name")
     restitution: OwnRestitution = None
     friction: OwnFriction = None
@@ -182,7 +182,7 @@ JointDamping = Annotated[
 Inertia = Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tuple[Vector3, Vector3, Vector3]
 
 
-class AnyBody(Part):
+class AnyBody(ScenePart):
     """A rigid body of a tree.
 
     The joint frame has the position `origin` and the rotation `angle` or `rpy` in the parent body's frame. The joint
@@ -257,7 +257,7 @@ class AnyBody(Part):
         return given
 
 
-class _PlanarJoint(Part):
+class _PlanarJoint(ScenePart):
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
     joint: Literal["fixed", "revolute", "prismatic", "planar"] = Field(description="how it moves: fixed; revolute "
@@ -288,7 +288,7 @@ class Body(AnyBody, _PlanarJoint):
         return inertia
 
 
-class _SpatialJoint(Part):
+class _SpatialJoint(ScenePart):
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
     joint: Literal["fixed", "revolute", "continuous", "prismatic", "spherical", "free_flyer"] = Field(description="how "

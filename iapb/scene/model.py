@@ -27,9 +27,9 @@ from iapb.scene.parts import (
     Name,
     NonNegative,
     Number,
-    Part,
     Path,
     Positive,
+    ScenePart,
     Text,
     Truth,
     Vector2,
@@ -56,14 +56,14 @@ Bodies = Annotated[tuple[V, ...], Field(min_length=1, max_length=MAX_BODIES,
 Walls = Annotated[tuple[V, ...], Field(max_length=MAX_WALLS, description="the static world")]
 
 
-class FrictionPair(Part):
+class FrictionPair(ScenePart):
     """The friction of one pair of things; it replaces the values that each of them gives."""
 
     between: tuple[Name, Name] = Field(description="names of two bodies, or of a body and a wall")
     friction: NonNegative = Field(description="coefficient mu [1] where these two touch")
 
 
-class Contact(Part):
+class Contact(ScenePart):
     """How contacts behave. The defaults are the paper's values; where it gives none, they are this project's."""
 
     auto: Truth = Field(False, description="true: stiffness, damping and coherence_distance are chosen from masses, "
@@ -115,7 +115,7 @@ _SHORT = BeforeValidator(lambda given: _WORDS.get(given, given) if isinstance(gi
                          json_schema_input_type=Literal["auto", "paper"] | Contact)
 
 
-class Hand(Part):
+class Hand(ScenePart):
     """The hand: a force on one body. A constant force is the worst case for stability (paper, section VI).
 
     The force is the sum of `force`, `force_table` and `force_function`, evaluated at the start of each step.
@@ -194,7 +194,7 @@ class SpatialHand(Hand):
 Waveform = Literal["step", "brake"]
 
 
-class Device(Part):
+class Device(ScenePart):
     """The haptic device. It has the tool's kinematics, so its lists have one number per tool coordinate."""
 
     force_limit: tuple[Positive, ...] | None = Field(None, description="largest force per coordinate [N, N m]; "
@@ -209,21 +209,21 @@ class Device(Part):
         "brake; default step")
 
 
-class Gains(Part):
+class Gains(ScenePart):
     """A spring and damper per coordinate of the tool (Table I)."""
 
     stiffness: PerCoordinate = Field(description="one per tool coordinate [N/m, N m/rad]")
     damping: PerCoordinate = Field(description="one per tool coordinate [N s/m, N m s/rad]")
 
 
-class Couplings(Part):
+class Couplings(ScenePart):
     """Gains of the couplings; the caller chooses which coupling is used."""
 
     four_channel: Gains | None = Field(None, description="K_coord and B_coord of Table I")
     unilateral: Gains | None = Field(None, description="K_cpl and B_cpl of Table I")
 
 
-class Scene(Part):
+class Scene(ScenePart):
     """A scene to simulate: bodies, walls, contact parameters, and the hand that moves the tool (SI units)."""
 
     name: Name = Field(description="the scene's name; runs are filed under it")

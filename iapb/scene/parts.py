@@ -54,7 +54,7 @@ class _Missing:
 MISSING = _Missing()
 
 
-class Part(BaseModel):
+class ScenePart(BaseModel):
     """A mapping of the scene file; it is immutable and has only the declared fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)

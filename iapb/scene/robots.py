@@ -27,13 +27,13 @@ from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
 from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
 from iapb.scene.document import Document
-from iapb.scene.parts import Name, Number, Part, Text, Truth, Vector3, mistakes_of
+from iapb.scene.parts import Name, Number, ScenePart, Text, Truth, Vector3, mistakes_of
 
 HELD = ("box", "sphere")  # URDF geometries that the compiled narrow phase supports
 MAX_ROBOTS = 100  # in one scene; each one is a file to read
 
 
-class Robot(Part):
+class Robot(ScenePart):
     """A URDF file as a tree of bodies."""
 
     name: Name = Field(description="the robot's name; its bodies are called <name>_<link>")

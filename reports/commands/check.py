@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from iapb.advice.checks import Caution, Start, check_scene, settled, step_limits
+from iapb.advice.checks import Caution, Start, check_scene, chosen_scene, step_limits
 from iapb.worlds import find_world
 from reports.commands.run import DISTRUSTED, SceneName, Values, cost_in_words, scene_given
 from reports.show import Answer, Json
@@ -19,7 +19,7 @@ def check(
     json_: Json = False,
 ) -> Answer:
     """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then."""
-    source, remarks = settled(scene_given(scene, set_))
+    source, remarks = chosen_scene(scene_given(scene, set_))
     law = find_world(world).law
     law = law.within(source) if hasattr(law, "within") else law
     cautions, (said, refused) = check_scene(source, law), cost_in_words(source, law)

@@ -16,7 +16,7 @@ from iapb.errors import ArgumentError, Mistake, SceneError
 from iapb.names import one_of
 from iapb.scene import find_scene, scene_folder, scene_names
 from iapb.scene.document import MAX_CHARACTERS, Document
-from iapb.scene.parts import Name, Number, Part, Text, mistakes_of
+from iapb.scene.parts import Name, Number, ScenePart, Text, mistakes_of
 from iapb.scene.parts import Path as FieldPath
 
 LAW = "law."  # paths below it are settings of the contact law
@@ -27,7 +27,7 @@ Value = Annotated[Number | bool | Text | tuple[Number, ...], Field()]
 Values = Annotated[tuple[Value, ...], Field(min_length=1, max_length=MAX_VALUES)]
 
 
-class Range(Part):
+class Range(ScenePart):
     """Values with equal differences or equal ratios."""
 
     start: Number = Field(alias="from", description="first value")
@@ -56,7 +56,7 @@ class Range(Part):
         return (self.start, *inner[1:-1], self.stop)
 
 
-class Span(Part):
+class Span(ScenePart):
     """The interval of random values."""
 
     start: Number = Field(alias="from", description="least value")
@@ -69,7 +69,7 @@ class Span(Part):
             yield ("to",), stop, f"at least {start}, where it starts"
 
 
-class Draws(Part):
+class Draws(ScenePart):
     """Random points: each value of a point is drawn from a uniform distribution on its interval."""
 
     count: Annotated[int, Field(ge=1, le=MAX_POINTS, strict=True)] = Field(description="how many points")
@@ -77,7 +77,7 @@ class Draws(Part):
     values: Annotated[dict[str, Span], Field(min_length=1)] = Field(description="value path: {from, to}")
 
 
-class Study(Part):
+class Study(ScenePart):
     """A sweep: every combination of the grid values and the random draws, in every world.
 
     Paths are those of a scene (``contact.stiffness``, ``bodies.peg.velocity.0``), or ``law.`` and a setting of the
