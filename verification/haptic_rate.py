@@ -12,8 +12,8 @@ from dataclasses import replace
 from reference.worlds import run_world
 from verification.check import Check, Topic
 from verification.claims.speed import C19, C22
+from verification.cost.accuracy import BUDGET_ROWS, ORDER_BIAS
 from verification.cost.growth import FITTED, SCALING, TITLES, most_contacts, printed_over_factored
-from verification.cost.impacts import BUDGET_ROWS, ORDER_BIAS
 from verification.cost.robots import ROBOTS
 from verification.cost.solvers import IMPACT_TIMES, faster, solvers_say
 from verification.cost.steps import BODIES, PROFILE, RACES, START

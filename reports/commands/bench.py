@@ -13,7 +13,7 @@ import typer
 from iapb.errors import ArgumentError
 from reports.provenance import processor
 from reports.show import Answer, Json, sentence, stage_progress
-from verification.cost.impacts import choices, short_time, which_method, work_precision
+from verification.cost.accuracy import choices, short_time, which_method, work_precision
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
 from verification.haptic_rate import haptic_study
 

@@ -29,7 +29,7 @@ from verification.check import Study
 from verification.claims import peg
 from verification.cost import effects
 from verification.finding import Failure, Finding, attempt
-from verification.hard_cases.study import on_hard_cases
+from verification.hard_cases.findings import on_hard_cases
 from verification.proofs import on_proofs
 
 Progress = Callable[[str, int, int], None]

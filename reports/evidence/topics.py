@@ -11,10 +11,10 @@ from typing import Any
 from reports.runner import Runner
 from verification import claims
 from verification.claims import peg
+from verification.cost.accuracy import work_precision
 from verification.cost.effects import effects_of_scenes
-from verification.cost.impacts import work_precision
 from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_of
-from verification.hard_cases.study import hard_cases
+from verification.hard_cases.findings import hard_cases
 from verification.laws.topic import counterexamples
 from verification.proofs import check_all
 from verification.proofs.coq_development import Theorem, theorems

@@ -16,7 +16,7 @@ from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot, note
 from reports.figures.style import BLUE, FORCE, INK, MUTED, OUTCOMES, STYLES, LineStyle, looks_of
 from verification.claims.speed import costs_more
-from verification.cost import impacts
+from verification.cost import accuracy
 from verification.cost import trajectories as motion
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
@@ -26,18 +26,18 @@ from verification.table import Table
 Row = Mapping[str, Any]
 
 _LOOKS: dict[str, LineStyle] = {  # method -> its look, which has its name at the curve
-    impacts.IAPB: STYLES["IAPB"], impacts.SWEEPS: STYLES["Gauss-Seidel"], impacts.LEMKE: STYLES["Lemke"],
-    impacts.CALLED: STYLES["IAPB, Python"], PRINTED: STYLES["printed, numpy"], impacts.QP: STYLES["DAQP, Python"],
+    accuracy.IAPB: STYLES["IAPB"], accuracy.SWEEPS: STYLES["Gauss-Seidel"], accuracy.LEMKE: STYLES["Lemke"],
+    accuracy.CALLED: STYLES["IAPB, Python"], PRINTED: STYLES["printed, numpy"], accuracy.QP: STYLES["DAQP, Python"],
 }
 _LEGEND = {look.name: look for look in _LOOKS.values()}
 _EXACT, _STRONG, _WEAK = 1e-9, 0.42, 0.16  # largest error of a strongly coloured cell; strengths of colours
-_LONGEST = 1e6 * impacts.LONGEST  # [µs]
+_LONGEST = 1e6 * accuracy.LONGEST  # [µs]
 
 
 @recipe("which-method", "work_precision")
 def which_method(numbers: Table) -> Drawn:
     """Draw a cell per size and budget."""
-    found = impacts.choices(numbers)
+    found = accuracy.choices(numbers)
     cells: dict[str, list[Markup]] = {}
     for row in found.records():
         words, look = "", (MUTED, 0.0)
@@ -50,7 +50,7 @@ def which_method(numbers: Table) -> Drawn:
             words = f"nearest: {row['nearest'].split(':')[-1].strip()}"
         cells.setdefault(f"{_contacts(row)}, d = {row['coordinates']}", []).append(cell(row["method"], words, *look))
     told = "; ".join(f"{row['contacts']} contacts in {row['budget']:g} µs: {row['method']}" for row in found.records())
-    budgets = [impacts.short_time(1e-6 * budget) for budget in dict.fromkeys(found.column("budget"))]
+    budgets = [accuracy.short_time(1e-6 * budget) for budget in dict.fromkeys(found.column("budget"))]
     return Drawn([Panel(grid(budgets, cells), told, wide=True)], found)
 
 
@@ -96,7 +96,7 @@ def _times_of_daqp(numbers: Table) -> Iterator[Row]:
     for c in dict.fromkeys(numbers.column("contacts")):
         ours, theirs = ({row["problem"]: row["time"] for row in
                          numbers.where(contacts=c, method=method, outcome="ok").records()}
-                        for method in (impacts.CALLED, impacts.QP))  # fmt: skip
+                        for method in (accuracy.CALLED, accuracy.QP))  # fmt: skip
         if ratios := [theirs[problem] / ours[problem] for problem in ours.keys() & theirs.keys()]:
             low, middle, high = (float(each) for each in np.quantile(ratios, (0.25, 0.5, 0.75)))
             yield {"contacts": c, "ratio": middle, "lower quartile": low, "upper quartile": high}
@@ -113,10 +113,10 @@ def _lost_on(name: str, kernels: Table) -> str:
 
 def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
     """Return a table of the fastest rival by number of contacts, compiled and called from Python, and its text."""
-    heads = {impacts.COMPILED: "fastest compiled", impacts.PYTHON: "fastest called from Python"}
+    heads = {accuracy.COMPILED: "fastest compiled", accuracy.PYTHON: "fastest called from Python"}
     lines: dict[str, list[str]] = {}
     for called in heads:
-        lost = impacts.lost_to_rivals(numbers, called)
+        lost = accuracy.lost_to_rivals(numbers, called)
         for c in dict.fromkeys(numbers.column("contacts")):
             here, cases = lost.where(contacts=c), set(numbers.where(called=called, contacts=c).column("problem"))
             best = max(here.records(), key=lambda row: float(row["ratio"]), default=None)
@@ -148,7 +148,7 @@ def impact_accuracy(numbers: Table) -> Drawn:
 
 def _accuracies(plot: Plot, measured: Table, look: LineStyle) -> Iterator[tuple[float, float]]:
     """Yield the median time and the largest error of each amount of work; draw gains of energy and failures."""
-    for rows in impacts.by_way(measured).values():
+    for rows in accuracy.by_way(measured).values():
         good = [row for row in rows if row["outcome"] == "ok"]
         lost = [row["failed after"] for row in rows if row["outcome"] != "ok"]
         if lost:
@@ -157,7 +157,7 @@ def _accuracies(plot: Plot, measured: Table, look: LineStyle) -> Iterator[tuple[
             continue
         time = float(np.median([row["time"] for row in good]))
         error = max(max(row["relative error"] for row in good), 1e-15)
-        if any(row["relative energy gain"] > impacts.NO_GAIN for row in good):
+        if any(row["relative energy gain"] > accuracy.NO_GAIN for row in good):
             plot.axes.plot(time, error, "o", markersize=9, markerfacecolor="none", markeredgecolor=FORCE)
         yield time, error
 
@@ -221,7 +221,7 @@ def _worth_said(row: Row) -> tuple[str, ...]:
     if row["best for its time"]:
         errors = dict.fromkeys(power_of_error(row[key]) for key in ("most exact there", "least exact there"))
         best = f"{row['best for its time']} of {scenes} scenes, {' to '.join(errors)}"
-    made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > impacts.NO_GAIN else "none"
+    made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > accuracy.NO_GAIN else "none"
     return row["called"], cost, power_of_error(row["least error"]), best, made
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from reports.figures.numbers import power_of_ten
 from verification.finding import Finding
-from verification.hard_cases.study import ENGINE, STABLE
+from verification.hard_cases.findings import ENGINE, STABLE
 from verification.table import Table
 
 # verdict -> its mark and the class of its colour: shape as well as colour

@@ -15,9 +15,9 @@ from iapb.run import Run
 from iapb.scene.mechanism import mechanism_of
 from reports.figures import RECIPES, complementarity, energy_gains, mechanics
 from reports.figures.paper import arm_energies
+from verification.cost.accuracy import WAYS
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
-from verification.cost.impacts import WAYS
 from verification.cost.trajectories import BELOW, INTEGRATORS, OK, TIMED_OUT, WORLDS
 from verification.table import Table, titled
 

@@ -23,7 +23,7 @@ from reports import cli, show
 from reports.live.replay import read_live, replay
 from reports.store.keys import content_hash
 from reports.store.runs import read_run
-from verification.cost.impacts import Choice
+from verification.cost.accuracy import Choice
 from verification.finding import REPRODUCED, Failure, Finding, Part, with_failures
 from verification.proofs.coq_development import Theorem
 from verification.table import Column, Table, titled

@@ -12,15 +12,15 @@ from reports.pages.records import Evidence
 from reports.runner import Runner
 from tests.reports.joined import joined
 from verification.finding import Finding, finding_of
-from verification.hard_cases import study
-from verification.hard_cases.study import STABLE
+from verification.hard_cases import findings
+from verification.hard_cases.findings import STABLE
 from verification.table import Table, table_from
 
 CHOSEN = ("grazing", "nearly_parallel_normals", "chatter")
 
 
 def summary(cases: tuple[Finding, ...]) -> Table:
-    return study.on_hard_cases(cases).tables["every method"]
+    return findings.on_hard_cases(cases).tables["every method"]
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +30,9 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Finding, ...]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("verification.hard_cases.shared_problems.FOLDER", Path("nowhere"))
         chosen = {name: catalogue.HARD_CASES[name] for name in (*CHOSEN, "bowl_of_low_rank")}
-        patch.setattr("verification.hard_cases.study.HARD_CASES", chosen)
+        patch.setattr("verification.hard_cases.findings.HARD_CASES", chosen)
         runner = Runner(tmp_path_factory.mktemp("runs"))
-        found = study.hard_cases(runner, lambda done, total: None, [])
+        found = findings.hard_cases(runner, lambda done, total: None, [])
         assert any("chatter" in label for label in runner.used)  # its runs are stored, and listed
     return found
 
@@ -73,5 +73,5 @@ def test_what_we_fail_stands_first_then_the_largest_share_of_what_is_allowed() -
 
 
 def test_the_page_says_the_verdict_before_the_decade(cases: tuple[Finding, ...]) -> None:
-    page = joined(Evidence(hard_cases=cases, topics=(study.on_hard_cases(cases),)), ())
+    page = joined(Evidence(hard_cases=cases, topics=(findings.on_hard_cases(cases),)), ())
     assert re.search(r'✕</span> gains energy</span> <span class="decade">10[⁻\d⁰¹²³⁴-⁹]+</span>', page)

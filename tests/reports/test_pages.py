@@ -42,7 +42,7 @@ from verification.finding import (
     Part,
     finding_of,
 )
-from verification.hard_cases.study import finding_on, on_hard_cases
+from verification.hard_cases.findings import finding_on, on_hard_cases
 from verification.laws.topic import counterexample, properties
 from verification.region import Region
 from verification.table import table_from, titled

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from verification.claims.speed import C19, C22
+from verification.cost.accuracy import BUDGET_ROWS, ORDER_BIAS
 from verification.cost.calls import PRINTED
 from verification.cost.effects import steps, summary
 from verification.cost.growth import FACTORED, FITTED, SCALING, fitted
-from verification.cost.impacts import BUDGET_ROWS, ORDER_BIAS
 from verification.cost.robots import MANY, ONE, ROBOTS
 from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL
 from verification.cost.steps import BODIES, IDEAL, PROFILE, RACES, START

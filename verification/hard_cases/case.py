@@ -16,7 +16,7 @@ from iapb.errors import IapbError
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from reference.exact import condition_number, exact_impact, row_condition_number
-from verification.hard_cases.exact import FrictionalImpact, exact_poisson
+from verification.hard_cases.exact_outcomes import FrictionalImpact, exact_poisson
 from verification.impacts import Floats
 
 Exact = NDArray[np.object_] | Floats

@@ -8,6 +8,7 @@ import pytest
 from iapb.system import System
 from verification.check import Study
 from verification.cost import robots, steps
+from verification.cost.accuracy import BUDGET_ROWS, Stopped
 from verification.cost.calls import PRINTED
 from verification.cost.growth import (
     ALLOWED,
@@ -19,7 +20,6 @@ from verification.cost.growth import (
     power_law,
     scaling,
 )
-from verification.cost.impacts import BUDGET_ROWS, Stopped
 from verification.cost.resting import RESTING
 from verification.cost.steps import OwnLoop
 from verification.finding import NOT_COMPUTED

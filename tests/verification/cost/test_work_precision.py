@@ -11,9 +11,8 @@ from iapb import ArgumentError
 from reports.commands.bench import seconds_of
 from verification import which_method
 from verification.check import Study
-from verification.cost import calls, impacts
-from verification.cost.calls import daqp_call, kernel_call
-from verification.cost.impacts import (
+from verification.cost import accuracy, calls
+from verification.cost.accuracy import (
     ACCURACY,
     COMPILED,
     IAPB,
@@ -28,6 +27,7 @@ from verification.cost.impacts import (
     order_bias,
     work_precision,
 )
+from verification.cost.calls import daqp_call, kernel_call
 from verification.cost.problems import patch, pile
 from verification.impacts import ImpactCase, timed_problems
 from verification.table import Table
@@ -140,9 +140,9 @@ def test_a_solver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch
         raise ImportError("no quantecon")
 
     monkeypatch.setattr(calls, "import_lcp_lemke", missing)
-    found = work_precision([(1, 3)], 3, [way for way in WAYS if way.method == impacts.LEMKE])
+    found = work_precision([(1, 3)], 3, [way for way in WAYS if way.method == accuracy.LEMKE])
     assert all("quantecon" in outcome for outcome in found.column("outcome"))
-    assert impacts.LEMKE not in [row["method"] for row in order_bias(Study(), 3)]
+    assert accuracy.LEMKE not in [row["method"] for row in order_bias(Study(), 3)]
 
 
 def test_a_size_is_measured_when_asked_for() -> None:

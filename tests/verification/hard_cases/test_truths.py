@@ -11,7 +11,7 @@ import pytest
 
 from verification.hard_cases import HARD_CASES, HardCase, TrajectoryCase, judge_hard_case
 from verification.hard_cases.case import FrictionalCase
-from verification.hard_cases.exact import exact_poisson
+from verification.hard_cases.exact_outcomes import exact_poisson
 from verification.hard_cases.friction import pushed_plate
 from verification.hard_cases.judge import restitution_residual, run_in_world
 from verification.hard_cases.motions import exact_height
