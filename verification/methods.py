@@ -42,7 +42,7 @@ def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """
     push = np.linalg.solve(M, J.T)
     W = J @ push
-    share = len(J) * _EPS * max(np.diag(W).max(initial=0.0), np.finfo(float).tiny)
+    share = len(J) * EPS * max(np.diag(W).max(initial=0.0), np.finfo(float).tiny)
     return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(W + share * np.eye(len(W)), J @ v)))
 
 
