@@ -21,7 +21,6 @@ from matplotlib.transforms import Bbox
 from iapb.run import Run
 from reports.figures import RECIPES, plot
 from reports.figures.condition_map import condition_map
-from reports.figures.corner import penetration_over_time
 from reports.figures.figure import Figure, Recipe, draw, standalone
 from reports.figures.labels import arrow_of_time, label_marks, name_curves
 from reports.figures.numbers import format_number
@@ -29,6 +28,7 @@ from reports.figures.paper import arm_energies
 from reports.figures.plot import Plot
 from reports.figures.style import CYCLE, LOOKS, STYLES, VARIABLES
 from tests.reports.figure_inputs import all_inputs
+from verification.scenes.measures import trace_of
 from verification.table import titled
 
 MOST_SERIES = 6
@@ -216,7 +216,7 @@ def test_figure_3_has_the_energies_that_follow_from_the_geometry() -> None:
 
 def test_penetration_is_that_of_the_deepest_contact(gallery: Gallery) -> None:
     run = gallery.inputs["corner/IAPB"]
-    depth, rows = penetration_over_time(run), run.contacts
+    depth, rows = trace_of(run).penetration, run.contacts
     for k in range(run.steps):
         gaps = rows.gap[rows.offsets[k] : rows.offsets[k + 1]]
         assert depth[k] == max(-gaps.min(), 0) if len(gaps) else depth[k] == 0
