@@ -60,7 +60,7 @@ def pit(space: bool, **contact: Any) -> Scene:
               "point": (x * np.eye(n)[0]).tolist(), "normal": (up - x * np.eye(n)[0] * 2.0).tolist()}
              for k, x in enumerate((0.0, 0.5, -0.5))]
     given = {"forces": "paper", "stiffness": 3000, "damping": 5, "restitution": 0.4, "friction_law": "regularised"}
-    return scene_of(bodies, walls, rate=500.0, duration=0.5, gravity=(-9.81 * up).tolist(),
+    return scene_of(bodies, walls, rate=500.0, duration=0.35, gravity=(-9.81 * up).tolist(),
                     integrator="semi_implicit_euler", contact=given | contact)
 
 
