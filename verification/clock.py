@@ -81,11 +81,9 @@ def time_cells(times: Times) -> dict[str, float]:
     return {f"{name} [µs]": 1e6 * value for name, value in zip(TIMES, values, strict=True)}
 
 
-def target(
-    sentence: str, met: bool, miss: str = "", *, timed: bool = True, quantities: Quantities = ()
-) -> Part:
+def target(asked: str, measured: str, wanted: str, met: bool, miss: str = "", *, timed: bool = True) -> Part:
     """Return a part on a target; `miss` is the text for the first page if the target is missed."""
-    return Part(sentence, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss, quantities=quantities)
+    return Part.of(asked, measured, wanted, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss)
 
 
 def limited(
@@ -94,8 +92,10 @@ def limited(
 ) -> Part:
     """Return a part on a value that should be at most (`least`: at least) the limit; `what` begins its sentence."""
     told, met = f"{what} {value:.3g}{unit}", value >= limit if least else value <= limit
-    sentence = f"{told[0].upper()}{told[1:]}{more}. Target: at {'least' if least else 'most'} {limit:g}{unit}."
-    return target(sentence, met, f"{told} (target {limit:g}{unit})", timed=timed, quantities=quantities)
+    wanted, asked = f"at {'least' if least else 'most'} {limit:g}{unit}", f"{what[0].upper()}{what[1:]}"
+    return Part(f"{asked} {value:.3g}{unit}{more}. Target: {wanted}.", REPRODUCED if met else MIXED, timed=timed,
+                miss="" if met else f"{told} (target {limit:g}{unit})", quantities=quantities, asked=asked,
+                measured=f"{value:.3g}{unit}{more}", target=wanted)  # fmt: skip
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:

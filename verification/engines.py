@@ -158,13 +158,13 @@ def row_of(record: EngineRecord) -> Row:
             "simulated [s]": record.duration or None, "failure": THROWN if thrown else record.failure}  # fmt: skip
 
 
-def sentence(rows: Sequence[Row]) -> str:
-    """Return the results of one engine at one choice of settings in one sentence, from its rows."""
+def told(rows: Sequence[Row]) -> tuple[str, str]:
+    """Return what is asked of one engine at one choice of settings, and the result, from its rows."""
     first, missed = rows[0], ", ".join(f"{row['scene']} ({_worst(row)})" for row in rows if row["law"] != MET)
     at = "with its own settings" if first["settings"] == OWN else f"with a step of {1e3 * MATCHED_STEP:g} ms"
     rise = max(row["largest rise of energy"] or 0.0 for row in rows)
-    return (f"{first['engine']} {first['version']}, {at}, gives the known outcome in {_met(rows)} of {len(rows)} "
-            f"scenes{missed and f'; it misses it in {missed}'}. Energy rises by at most {rise:.2g}.")  # fmt: skip
+    return (f"{first['engine']} {first['version']}, {at}: scenes with the known outcome",
+            f"{_met(rows)} of {len(rows)}{missed and f'; not {missed}'}. Energy rises by at most {rise:.2g}")
 
 
 def _worst(row: Row) -> str:
@@ -199,7 +199,7 @@ def _says(table: Table) -> Iterator[Part]:
     for engine, choice in dict.fromkeys((row["engine"], row["settings"]) for row in present):
         group = [row for row in present if (row["engine"], row["settings"]) == (engine, choice)]
         missed = _misses(group)
-        yield Part(sentence(group), MIXED if missed else REPRODUCED, miss=missed if _is_ours(group[0]) else "")
+        yield Part.of(*told(group), "all", MIXED if missed else REPRODUCED, miss=missed if _is_ours(group[0]) else "")
     absent = sorted(set(table.where(law=MISSING).column("engine")))
     if absent:
         yield Part(f"Not installed, hence not compared: {', '.join(absent)}.", NOT_TESTABLE, optional=True)

@@ -62,6 +62,7 @@ class Part:
     role : "" for the statement of the question, MISPRINT or BEYOND for what is shown beside it and never decides
     named : the quantity in words, for "fails in ..."; by default the name
     quantities : the QUANTITIES that the sentence quotes, each with its value as printed there
+    asked, measured, target : the part as a row of a table, if it has them
     """
 
     sentence: str
@@ -79,9 +80,18 @@ class Part:
     role: str = ""
     named: str = ""
     quantities: Quantities = ()
+    asked: str = ""
+    measured: str = ""
+    target: str = ""
 
     def __post_init__(self) -> None:
         check_quantities(self.quantities, self.sentence)
+
+    @classmethod
+    def of(cls, asked: str, measured: str, target: str, verdict: str, name: str = "", **more: Any) -> Part:
+        """Return a part from what is asked, measured and wanted; its sentence says all three."""
+        return cls(f"{asked}: {measured}. Target: {target}.", verdict, name, asked=asked, measured=measured,
+                   target=target, **more)  # fmt: skip
 
     @property
     def outcome(self) -> str:

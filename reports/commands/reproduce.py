@@ -17,7 +17,7 @@ from iapb.names import one_of
 from reports.commands.report import difference_lines
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, unlike
 from reports.evidence.gather import failed_cases, gather
-from reports.evidence.runs import FIGURE_RUNS, shipped_scene
+from reports.evidence.runs import FIGURE_RUNS, TILTED, shipped_scene, tilted_runs
 from reports.figures import RECIPES
 from reports.figures.figure import draw, standalone
 from reports.numbers_file import read_numbers
@@ -158,7 +158,7 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
 def _inputs(needs: tuple[str, ...], out: Path, depth: str,
             progress: Any) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:  # fmt: skip
     """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice, compute all evidence."""
-    if not all(name in FIGURE_RUNS or name.startswith("scene/") for name in needs):
+    if not all(name in (*FIGURE_RUNS, TILTED) or name.startswith("scene/") for name in needs):
         evidence = gather(out, depth, progress)
         return figure_inputs(evidence), evidence.failed
     runner, found = Runner(out / "runs"), dict[str, Any]()
@@ -166,6 +166,8 @@ def _inputs(needs: tuple[str, ...], out: Path, depth: str,
         if name in FIGURE_RUNS:
             scene, values, world, rendering = FIGURE_RUNS[name]
             found[name] = runner(shipped_scene(scene, values), world, rendering)
+        elif name == TILTED:
+            found[name] = tilted_runs(runner)
         else:
             found[name] = shipped_scene(name.removeprefix("scene/")).resolved()
         progress("runs of the figure", done, len(needs))

@@ -17,7 +17,7 @@ from reports.counterexamples import ENGINE, CampaignRequest, recheck_command
 from reports.counterexamples import recheck as judge_again
 from reports.show import Answer, Json, stage_progress
 from verification import check_passivity
-from verification.engines import ERRORS, MEASURES, SETTINGS, compare_engines, row_of, sentence, verdict
+from verification.engines import ERRORS, MEASURES, SETTINGS, compare_engines, row_of, told, verdict
 from verification.laws import CONTRACTS
 from verification.laws.bounds import LawCount
 from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
@@ -154,7 +154,7 @@ def _simulators(simulators: Sequence[str], scenes: Sequence[str]) -> Answer:
             if of_engine[0].missing:
                 lines.append(f"{of_engine[0].title} is not installed here: {of_engine[0].missing}")
                 break
-            lines.append(sentence(ERRORS.table_of(map(row_of, of_engine)).records()))
+            lines.append(": ".join(told(ERRORS.table_of(map(row_of, of_engine)).records())) + ".")
     if present:
         rows = [{"engine": one.engine, "scene": one.scene, "settings": one.choice, "law": verdict(one),
                  **dict.fromkeys(MEASURES), **one.measures} for one in present]  # fmt: skip

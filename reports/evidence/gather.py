@@ -63,6 +63,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     _compute_beside(stages, out, depth, progress)
     lost: list[Failure] = []
     read = attempt("all of it", partial(runs.figure_runs, runner, partial(progress, FIGURE_RUNS), lost), lost)
+    tilted = attempt(runs.TILTED, partial(runs.tilted_runs, runner), lost)
     for stage in stages.values():
         _fill(stage, runner, depth, progress)
 
@@ -83,7 +84,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     needed = stages["effects"].records or {}
     shown = {name: needed[name] for name in effects.SCENES if name in needed}
     inputs = {**(read or {}), **{f"scene/{name}": scene for name, scene in scenes.items()},
-              "arm_energies": arm_energies(), "work_precision": stages["accuracy"].records,
+              runs.TILTED: tilted, "arm_energies": arm_energies(), "work_precision": stages["accuracy"].records,
               "effect_costs": effects.summary(shown), "effect_steps": effects.steps(needed),
               "machine": "{cpu}, report of {date}".format_map(facts)}  # fmt: skip
     failed = failed_cases(out / "tables", {FIGURE_RUNS: lost} | {one.name: one.failures for one in stages.values()})

@@ -10,6 +10,7 @@ from iapb import find_scene, load_scene
 from iapb.run import Run
 from iapb.scene import Scene
 from reports.runner import Runner
+from verification.claims.conditions import IGNORED, TILTS, Condition
 from verification.finding import Failure, attempt, counted
 
 # Emulation of the experiments in the paper's section VII: the device runs at 512 Hz with a delay of one step in each
@@ -41,6 +42,8 @@ FIGURE_RUNS: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "space/tumbling_body": ("tumbling_body", {}, "IAPB", "full"),
 }
 
+TILTED = "peg at every tilt"  # name of the input made by `tilted_runs`
+
 
 def shipped_scene(name: str, values: dict[str, Any] | None = None) -> Scene:
     """Return a scene that comes with the project, with some values changed."""
@@ -63,3 +66,11 @@ def figure_runs(
 
 def _run(runner: Runner, scene: str, values: dict[str, Any], world: str, rendering: str) -> Run:
     return runner(shipped_scene(scene, values), world, rendering)
+
+
+def tilted_runs(runner: Runner) -> dict[float, dict[str, Run]]:
+    """Return the runs of the peg in the corner by tilt [rad] and world; claim C10 uses the same runs."""
+    scene = shipped_scene("peg_corner")
+    with runner.recording(TILTED):
+        return {tilt: {world: runner(Condition(tilt).place(scene), world) for world in IGNORED}
+                for tilt in TILTS["full"]}  # fmt: skip

@@ -13,6 +13,7 @@ from reports.figures import (  # noqa: F401
     paper,
     scenes,
     stability,
+    tilts,
 )
 from reports.figures.figure import MADE, TEXTS, Recipe
 

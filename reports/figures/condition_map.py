@@ -6,6 +6,9 @@ share a place, the size of the dot is the share of trials in which the claim hol
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from reports.figures.figure import Figure, Panel
@@ -15,39 +18,44 @@ from verification.table import Table
 
 _SIZE = (4.1, 2.4)  # inches
 _DOT = 6.8  # diameter of a full dot [points]
+_SHOWN = {"rad": ("°", 180.0 / np.pi), "m": ("mm", 1e3)}  # unit of a column -> unit on an axis, and the factor
 
 
 def condition_map(name: str, title: str, caption: str, table: Table, x: str, y: str, *split: str,
-                  ranked: bool = False) -> Figure:  # fmt: skip
+                  ranked: bool = False, words: Mapping[str, str] = MappingProxyType({})) -> Figure:  # fmt: skip
     """Draw the outcomes over the columns x and y, in one panel for every combination of the columns in `split`.
 
     ranked : whether x shows ranks, with a tick for each value, so that close values are drawn apart
+    words : the words for a text in the heading of a panel
     """
-    titles = {column.key: column.title for column in table.columns}
+    units = {column.key: _SHOWN.get(column.unit, (column.unit, 1.0)) for column in table.columns}
+    titles = {key: f"{key} [{unit}]" if unit else key for key, (unit, _) in units.items()}
     ticks, drawn = sorted(set(table.column(x))), []
     panels: dict[str, dict[tuple[float, float], list[bool | None]]] = {}
     for row, held in zip(table.records(), table.holds, strict=True):
-        panel = ", ".join(row[key] if isinstance(row[key], str) else f"{titles[key]}: {row[key]:g}" for key in split)
-        place = float(ticks.index(row[x]) if ranked else row[x]), float(row[y])
+        panel = ", ".join(words.get(row[key], row[key]) if isinstance(row[key], str) else
+                          f"{titles[key]}: {units[key][1] * row[key]:.3g}" for key in split)  # fmt: skip
+        place = float(ticks.index(row[x])) if ranked else units[x][1] * row[x], units[y][1] * row[y]
         panels.setdefault(panel, {}).setdefault(place, []).append(held)
     for number, (panel, places) in enumerate(panels.items()):
+        marks: dict[tuple[str, float], list[tuple[float, float]]] = {}  # outcome and size -> places
+        for at, trials in places.items():
+            decided = [held for held in trials if held is not None]
+            share = float(np.mean(decided)) if decided else 0.0
+            if share < 1.0:
+                marks.setdefault(("fails", 6.0) if decided else ("cannot tell", 5.0), []).append(at)
+            if share > 0.0:
+                marks.setdefault(("holds", _DOT * share**0.5), []).append(at)
         with Plot(f"{name}-{number}", _SIZE) as plot:
-            for at, trials in places.items():
-                decided = [held for held in trials if held is not None]
-                share = float(np.mean(decided)) if decided else 0.0
-                if not decided:
-                    plot.marks([at], OUTCOMES["cannot tell"], markersize=5, zorder=3)
-                elif share < 1.0:
-                    plot.marks([at], OUTCOMES["fails"], markersize=6, zorder=4)
-                if share > 0.0:
-                    plot.marks([at], OUTCOMES["holds"], markersize=_DOT * share**0.5, zorder=3)
+            for (outcome, size), found in marks.items():
+                plot.marks(found, OUTCOMES[outcome], markersize=size, zorder=4 if outcome == "fails" else 3)
             plot.axes.margins(0.08)
             plot.axes.set(xlabel=titles[x], ylabel=titles[y])
             if ranked:
-                plot.axes.set_xticks(range(len(ticks)), [f"{tick:g}" for tick in ticks], rotation=90)
+                plot.axes.set_xticks(range(len(ticks)), [f"{units[x][1] * tick:.2g}" for tick in ticks], rotation=90)
         outcomes = [held for trials in places.values() for held in trials]
-        words = (f"Map over {titles[x]} and {titles[y]}: the claim holds in {outcomes.count(True)} of {len(outcomes)} "
-                 f"trials, fails in {outcomes.count(False)}.")  # fmt: skip
-        drawn.append(Panel(plot.svg, words, panel))
+        told = (f"Map over {titles[x]} and {titles[y]}: the claim holds in {outcomes.count(True)} of "
+                    f"{len(outcomes)} trials, fails in {outcomes.count(False)}.")  # fmt: skip
+        drawn.append(Panel(plot.svg, told, panel))
     legend = tuple(OUTCOMES.items())
     return Figure(name, "", title, caption, tuple(drawn), None, legend if None in table.holds else legend[:2])

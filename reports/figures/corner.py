@@ -1,4 +1,4 @@
-"""The peg in the corner: the first picture, and Figures 7 to 13, in four worlds and with a limited or emulated device.
+"""The peg in the corner: Figures 7 to 13, in four worlds and with a limited or emulated device.
 
 Each figure shows trajectories or forces of some runs, on the device side. The paper's frame has x to the left and y
 down (its drawing is turned by 180 degrees), so both axes of a path are reversed: the corner is at the lower right, as
@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
-from reports.figures.geometry import body_outlines
 from reports.figures.labels import arrow_of_time
-from reports.figures.plot import PATH, TIME, Canvas, Plot
-from reports.figures.style import MUTED, PANEL, STYLES, line_arguments
+from reports.figures.plot import PATH, TIME, Plot
+from reports.figures.style import STYLES, line_arguments
 from verification.scenes import measures
 from verification.scenes.measures import Trace
 from verification.table import titled
@@ -169,16 +168,14 @@ def _seen_apart(values: Sequence[Floats]) -> tuple[int, int]:
     return max(parted - _LEAD, 0), int(rest) + int(rest - parted) // 10 + 2
 
 
-def _path(key: str, runs: Mapping[str, Run], size: tuple[float, float] = PANEL, *, equal: bool = False) -> str:
+def _path(key: str, runs: Mapping[str, Run]) -> str:
     """Draw y against x of the device, from shortly before the first contact."""
-    with Plot(key, size, kind="" if equal else PATH) as plot:
+    with Plot(key, kind=PATH) as plot:
         for number, (curve, run) in enumerate(runs.items()):
             x, y = MILLI * run.device_q[_first_shown(runs) :, :2].T
             plot.axes.plot(x, y, **line_arguments(STYLES[curve]), markevery=_marks(len(x), number),
                            zorder=3 + number / 10)
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        if equal:
-            plot.axes.set_aspect("equal", adjustable="datalim")
         plot.axes.xaxis.set_inverted(True)
         plot.axes.yaxis.set_inverted(True)
         arrow_of_time(plot.axes)
@@ -218,45 +215,3 @@ def _forces(key: str, traces: Traces) -> list[Panel]:
 RECIPES = tuple(_recipe(number, runs, forces) for number, runs, forces in (
     (7, UNLIMITED, False), (8, UNLIMITED, True), (9, STRATEGIES, False), (10, LIMITED, False), (11, LIMITED, True),
     (12, DEVICE, False), (13, DEVICE, True)))  # fmt: skip
-
-
-# The first picture
-
-_GHOSTS = 4  # poses of the ideal run between start and end
-_MARGIN = 0.005  # [m] of wall and of air around the motion
-_FORCE_LENGTH = 0.013  # [m] on paper per newton
-_SIZE = (4.5, 3.8)  # inches
-
-
-@recipe("hero", *UNLIMITED.values())
-def hero(*given: Run) -> Drawn:
-    """Draw the picture from the runs named in UNLIMITED."""
-    runs = dict(zip(UNLIMITED, given, strict=True))
-    apart = {name: MILLI * np.hypot(*(run.device_q[-1, :2] - runs["ideal"].device_q[-1, :2]))
-             for name, run in runs.items() if name != "ideal"}  # fmt: skip
-    ends = ", ".join(f"{name} {distance:.2f} mm" for name, distance in apart.items())
-    panels = (
-        Panel(_motion(runs["ideal"]), "A tilted peg moves to the lower right and comes to rest in a corner.",
-              "the motion in the ideal world, to scale"),
-        Panel(_path("hero-paths", runs, _SIZE, equal=True),
-              "Paths of the hand in the four worlds. Distance of the hand from the ideal at the end: "
-              f"{ends}.", "the path of the hand, magnified, equal scales"),
-    )  # fmt: skip
-    return Drawn(panels, None, {curve: STYLES[curve] for curve in UNLIMITED})
-
-
-def _motion(run: Run) -> str:
-    scene = run.scene_resolved
-    corners = np.vstack(body_outlines(scene, run.pose[0]) + body_outlines(scene, run.pose[-1]))
-    low, high = np.minimum(corners.min(axis=0), 0.0) - _MARGIN, np.maximum(corners.max(axis=0), 0.0) + _MARGIN
-    with Canvas("hero-scene", low, high, _SIZE, turned=True) as canvas:
-        canvas.walls(scene)
-        canvas.bodies(scene, run.pose[-1])
-        moved = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run.q[:, :2], axis=0).T))])
-        for k in np.searchsorted(moved, np.arange(_GHOSTS) / _GHOSTS * moved[-1]):  # even along the path, not in time
-            canvas.bodies(scene, run.pose[k], color="none", edge=MUTED, width=0.8)
-        canvas.axes.plot(*run.q[:, :2].T, **line_arguments(STYLES["ideal"]), zorder=4)
-        force = np.asarray(scene["hand"]["force"][:2])
-        canvas.scale_bar((high[0] - 0.002, _MARGIN / 2), 0.01, "10 mm")
-        canvas.named_arrow(run.q[0, :2], _FORCE_LENGTH * force, f"hand, {np.hypot(*force):.2f} N")
-    return canvas.svg

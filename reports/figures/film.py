@@ -129,27 +129,33 @@ class Film:
         """Yield the contacts at a moment and the impulses since the one before: of the strongest ones, a dot and a line
         for each contact, a cross for each impulse; the size is a root of the strength."""
         contacts, steps = self.run.contacts, _moments(self.run, _MARKED)
-        for k, step in enumerate(steps[:-1]):
-            begins, ends = (int(contacts.offsets[each]) for each in (step, step + 1))
-            before = int(contacts.offsets[steps[k - 1]]) if k else 0
-            span = self.run.time[step] / self.end, self.run.time[steps[k + 1]] / self.end
-            for strengths, first, color in ((contacts.normal_force, begins, BLUE), (contacts.impulse, before, FORCE)):
-                drawn, chosen = "", first + np.flatnonzero(strengths[first:ends] > 0.0)
-                for row in chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]:
-                    (x, y), size = self.flat(contacts.point[row]), np.sqrt(strengths[row] / strengths.max())
-                    if not (0.0 <= x <= SIZE[0] and 0.0 <= y <= SIZE[1]):
-                        continue
-                    if color == FORCE:
-                        arm = 6 + 8 * size
-                        drawn += f"M{x - arm:.1f} {y:.1f}h{2 * arm:.1f}M{x:.1f} {y - arm:.1f}v{2 * arm:.1f}"
-                    else:
-                        nx, ny = (6 + 26 * size) * _sign(self.run) * contacts.normal[row][:2]
-                        drawn += f"M{x - 3:.1f} {y:.1f}a3 3 0 1 0 6 0a3 3 0 1 0 -6 0M{x:.1f} {y:.1f}l{nx:.1f} {-ny:.1f}"
-                if drawn:
-                    yield (f'<path fill="none" stroke="{css(color)}" stroke-width="2" d="{drawn}">'
-                           f'<animate attributeName="display" values="none;inline;none" calcMode="discrete" '
-                           f'keyTimes="0;{max(span[0], 1e-4):.4f};{span[1]:.4f}" dur="{self.slower * self.end:g}s" '
-                           'repeatCount="indefinite"/></path>')
+        for strengths, color in ((contacts.normal_force, BLUE), (contacts.impulse, FORCE)):
+            drawn: list[tuple[str, int, int]] = []  # marks, and the moments from and until which they are visible
+            for k, step in enumerate(steps[:-1]):
+                first = step if color == BLUE or k == 0 else steps[k - 1]
+                begins, ends = int(contacts.offsets[first]), int(contacts.offsets[step + 1])
+                chosen = begins + np.flatnonzero(strengths[begins:ends] > 0.0)
+                strongest = chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]
+                mark = "".join(self.mark(row, np.sqrt(strengths[row] / strengths.max()), color) for row in strongest)
+                since = drawn.pop()[1] if drawn and drawn[-1][0] == mark else step
+                drawn.append((mark, since, steps[k + 1]))
+            shown = "".join(
+                f'<path d="{mark}"><animate attributeName="display" values="none;inline;none" calcMode="discrete" '
+                f'keyTimes="0;{max(self.run.time[begin] / self.end, 1e-4):.4f};{self.run.time[end] / self.end:.4f}" '
+                f'dur="{self.slower * self.end:g}s" repeatCount="indefinite"/></path>'
+                for mark, begin, end in drawn if mark)  # fmt: skip
+            yield f'<g fill="none" stroke="{css(color)}" stroke-width="2" stroke-linejoin="round">{shown}</g>'
+
+    def mark(self, row: int, size: float, color: str) -> str:
+        """Return the path data of one contact or impulse, "" outside of the picture."""
+        x, y = self.flat(self.run.contacts.point[row])
+        if not (0.0 <= x <= SIZE[0] and 0.0 <= y <= SIZE[1]):
+            return ""
+        if color == FORCE:
+            arm = round(6 + 8 * size)
+            return f"M{x:.1f} {y:.1f}m-{arm} 0h{2 * arm}m-{arm}-{arm}v{2 * arm}"
+        nx, ny = (6 + 26 * size) * _sign(self.run) * self.run.contacts.normal[row][:2]
+        return f"M{x:.1f} {y:.1f}m-1-1h2v2h-2zm1 1l{nx:.0f} {-ny:.0f}"
 
 
 def _ring(points: Floats) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from itertools import groupby
 from posixpath import dirname, relpath
@@ -18,14 +18,14 @@ from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, is_number
-from reports.pages.first import answer, count_claims, facts
+from reports.pages.first import NEXT, facts, made_from
 from reports.pages.formulas import formula, prose
 from reports.pages.matrix import matrices, worst_first
 from reports.pages.records import Evidence, anchor, runs_by_user
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import explained
 from verification.claims.conditions import Condition
-from verification.claims.peg import ALL_THREE
+from verification.claims.peg import ALL_THREE, NAMED
 from verification.finding import (
     BEYOND,
     IN_WORDS,
@@ -35,6 +35,7 @@ from verification.finding import (
     REFUTED,
     REPRODUCED,
     VERDICTS,
+    WORST_FIRST,
     Finding,
     Part,
 )
@@ -75,8 +76,7 @@ def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dic
         "used": {user for entry in evidence.manifest for user in entry.used_by},
     }  # fmt: skip
     first = environment.get_template("first.html.j2").render(
-        shared, answer=answer(evidence), facts=facts(evidence), counts=count_claims(evidence.claims),
-        first_map=first_map(evidence.claims),
+        shared, facts=facts(evidence), made_from=made_from(evidence), first_map=first_map(evidence.claims), next=NEXT,
     )  # fmt: skip
     maps = {claim.key: map_of(claim) for claim in evidence.claims}
     layout = environment.get_template("section.html.j2")
@@ -114,8 +114,6 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     return {**scenes, **tables, **evidence.inputs}
 
 
-
-
 def map_of(claim: Finding) -> Figure | None:
     """Return a map of where a claim holds, over its two decisive conditions; None if it holds everywhere."""
     table = claim.tables.get(claim.key)
@@ -135,15 +133,16 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
     grid = grid.only(part in parts for part in grid["part"])
     if not grid.rows:
         return None
-    counts = [f"{sum(shown.decided)} of {len(shown.decided)} {'' if part == ALL_THREE else 'in '}{part}"
+    counts = [f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
               for part in parts for shown in [grid.where(part=part)]]
     caption = (
-        "Each mark is one start of the peg, simulated in four worlds. A dot: the hand in IAPB is closest to that in "
-        "the ideal world. A cross: PB or CBuc is closer. A ring: the difference is smaller than the ideal world's own "
-        f"error. IAPB is closest in {', '.join(counts)} (x, y and theta in the kinetic metric)."
+        "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: with impulses (IAPB) the "
+        "hand's path is nearest to the path at a rigid wall (ideal). A cross: springs only (PB) or a rigid wall felt "
+        "through a spring (CBuc) is nearer. A ring: they differ by less than the error of ideal. "
+        f"IAPB is closest in {', '.join(counts)} (together: in the kinetic metric)."
     )
-    return condition_map("where-c10", "Where IAPB is the closest", caption, grid, "tilt", "clearance", "part",
-                         ranked=True)
+    return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
+                         "part", ranked=True, words=NAMED)
 
 
 def played(figures: Mapping[str, Sequence[Figure]]) -> dict[str, str]:
@@ -152,10 +151,21 @@ def played(figures: Mapping[str, Sequence[Figure]]) -> dict[str, str]:
             if figure.panels and figure.panels[0].film for name in figure.inputs}  # fmt: skip
 
 
+def ranked(found: Iterable[Any]) -> list[Any]:
+    """Return claims, topics or parts, the worst verdict first."""
+    return sorted(found, key=lambda one: WORST_FIRST.index(one.verdict))
+
+
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
     failing, total = sum(part.verdict == REFUTED for part in topic.parts), len(topic.parts)
     return f"{failing} of {total} findings fail" if failing and total > 1 else FINDINGS[topic.verdict]
+
+
+def judged(part: Part) -> str:
+    """Return the verdict on a part in words: whether its target is met, if it has one."""
+    met = {REPRODUCED: "met", MIXED: "missed", REFUTED: "missed"} if part.target else FINDINGS
+    return part.outcome if part.role or part.region else met.get(part.verdict, FINDINGS[part.verdict])
 
 
 def counted(part: Part) -> str:
@@ -184,9 +194,9 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        as_finding=FINDINGS.__getitem__, badge_words=badge_words, counted=counted, tables_without=tables_without,
+        judged=judged, badge_words=badge_words, counted=counted, tables_without=tables_without,
         runs_by_user=runs_by_user, anchor=anchor,
-        matrices=matrices, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
+        ranked=ranked, matrices=matrices, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals["rows_shown"] = ROWS_SHOWN
     environment.tests["numeric"] = is_number

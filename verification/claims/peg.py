@@ -98,7 +98,7 @@ def closest(row: Row) -> bool | None:
     return None if abs(ahead) < RESOLVED[row["coordinate"]] else bool(ahead > 0.0)
 
 
-def _distances(study: Study, condition: Condition, rendering: str) -> Iterator[dict[str, Any]]:
+def distances(study: Study, condition: Condition, rendering: str) -> Iterator[dict[str, Any]]:
     """Yield per coordinate the RMS and the largest distance of each world from ideal, then the RMS of all three."""
     ideal = trace(study, condition, "ideal")
     worlds = {name: trace(study, condition, name, rendering if name == "IAPB" else "full") for name in WORLDS}
@@ -142,7 +142,7 @@ def slowest_runs(study: Study) -> Iterator[tuple[Scene, str]]:
 def _trajectory(study: Study, condition: Condition) -> Iterator[Row]:
     """Yield one row per coordinate and one for all three together; the part is the coordinate, and LARGER if so."""
     larger = f", {LARGER}" if condition.approach_velocity > PAPERS else ""
-    for row in _distances(study, condition, "full"):
+    for row in distances(study, condition, "full"):
         yield {"part": f"{row['coordinate']}{larger}"} | condition.row() | row
 
 
@@ -307,7 +307,7 @@ PENETRATION = "penetration"
 def _limited_trajectory(study: Study, condition: Condition) -> Iterator[Row]:
     """Yield per coordinate the distances from ideal, then the penetrations; IAPB spreads its impulses over steps."""
     start = condition.row("force_limit", *START)
-    yield from (start | row for row in _distances(study, condition, "spread"))
+    yield from (start | row for row in distances(study, condition, "spread"))
     yield start | {"coordinate": PENETRATION,
                    "IAPB": deepest_penetration(trace(study, condition, "IAPB", "spread")),
                    "PB": deepest_penetration(trace(study, condition, "PB"))}  # fmt: skip

@@ -176,26 +176,26 @@ def _compared(study: Study, name: str) -> Iterator[Row]:
 def _map_says(table: Table) -> Iterator[Part]:
     """Yield the parts on the statements, on the project's scenes, and on contacts that touch without approaching."""
     rows = table.records()
-    yield Part(
-        "With equal e the two laws agree if and only if some p >= 0 gives IAPB's velocity; "
-        f"{sum(table['contradictions'])} of {sum(table['cases'])} impacts contradict this. Where they differ, "
+    yield Part.of(
+        "With equal e the two laws agree if and only if some p >= 0 gives IAPB's velocity",
+        f"{sum(table['contradictions'])} of {sum(table['cases'])} impacts contradict this. Where the laws differ, "
         f"IAPB loses ½ (1−e)/(1+e) · distance² more (to {max(table['defect']):.0e}), at most "
-        f"{max(table['largest extra loss of KE⁻']):.0%} of KE⁻.", "", "statements")  # fmt: skip
+        f"{max(table['largest extra loss of KE⁻']):.0%} of KE⁻", "no contradiction", "", "statements")  # fmt: skip
     if scenes := [row for row in rows if row["impacts"].startswith("scene ")]:
         apart = sorted({row["impacts"].removeprefix("scene ") for row in scenes if row["share that agrees"] < 1.0})
         pulling = sum(round(row["share that truly pulls"] * row["cases"]) for row in scenes)
-        yield Part(
-            f"Impacts of the project's scenes, each run with its own e and with e = {SCENE_RESTITUTIONS[1]:g}: "
-            f"{sum(row['cases'] for row in scenes)}, of which {pulling} need a pulling impulse (no p >= 0 gives their "
-            f"velocity). The laws {'differ in ' + ', '.join(apart) if apart else 'agree in all'}.",
-            MIXED if apart else REPRODUCED, "scenes")  # fmt: skip
+        yield Part.of(
+            f"Impacts of the project's scenes, each run with its own e and with e = {SCENE_RESTITUTIONS[1]:g}",
+            f"{pulling} of {sum(row['cases'] for row in scenes)} need a pulling impulse (no p >= 0 gives their "
+            f"velocity). The laws {'differ in ' + ', '.join(apart) if apart else 'agree in all'}",
+            "the laws agree in all scenes", MIXED if apart else REPRODUCED, "scenes")  # fmt: skip
     beside = table.where(impacts="with a neighbour")
     if beside.rows:
         ours, theirs = (float(np.mean(beside[f"left approaching by {law}"])) for law in ("IAPB", "the LCP"))
-        yield Part(
-            "A neighbouring contact that touches without approaching has no row in (19). After the impact it "
-            f"approaches in {100 * ours:.0f} % of such impacts with IAPB, and in {100 * theirs:.0f} % with the LCP on "
-            "the same rows.", verdict_of_share(1.0 - ours), "touching")  # fmt: skip
+        yield Part.of(
+            "A neighbouring contact that touches without approaching has no row in (19): it approaches afterwards",
+            f"in {100 * ours:.0f} % of such impacts with IAPB, and in {100 * theirs:.0f} % with the LCP on the same "
+            "rows", "never", verdict_of_share(1.0 - ours), "touching")  # fmt: skip
 
 
 MAP = Check(

@@ -139,12 +139,12 @@ def _says(table: Table) -> Part:
     beyond = [row for row in rows if row["contacts"] > limit] or rows
     pulling = 100.0 * float(np.average([row["share of impulses that pull"] for row in beyond],
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
-    return Part(
-        "Dense piles, with every colliding contact as an equality (19): impulses that push can produce the velocity "
+    return Part.of(
+        "Dense piles, with every colliding contact as an equality (19): impulses that push can produce the velocity",
         f"in {agree:.0f} of {piles} impacts. The largest of these has {limit} contacts; this is no safe limit, since "
         f"many smaller ones fail. Beyond {limit} contacts, {pulling:.0f} % of the impulses pull. With impulses that "
         "only push (method \"poisson\", world IAPB-push) the velocity equals the LCP's to "
-        f"{max(table['pushing from the LCP']):.0e}.",
+        f"{max(table['pushing from the LCP']):.0e}", "in all impacts",
         verdict_of_share(agree / piles), "piles",
         miss=f"in impacts with more than {limit} contacts, {pulling:.0f} % of the impulses pull")  # fmt: skip
 

@@ -433,8 +433,8 @@ def _motions_say(motions: Table) -> Iterator[Part]:
         text = ", ".join(f"{name} {_error(run)} in {run['time']:.3g} ms per simulated second"
                          for name, run in best.items())
         more = f"; IAPB reaches MuJoCo's smallest error in {as_good:.3g} ms" if as_good < inf else ""
-        yield target(f"Whole motion, {scene}: smallest position error, in lengths of the body: {text}{more}.",
-                     exact and fast, f"on the whole motion of {scene} " + (
+        yield target(f"Whole motion, {scene}: smallest position error, in lengths of the body", f"{text}{more}",
+                     "none more exact, and MuJoCo's error in less time", exact and fast, f"on the whole motion of {scene} " + (
                          "another method is as exact in less time" if exact else
                          f"no time step makes IAPB as exact as {most} ({_error(ours)} against {_error(best[most])})"))
 

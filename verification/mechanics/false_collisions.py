@@ -95,10 +95,10 @@ def filters(table: Table) -> Part:
                        for name in SETTINGS)  # fmt: skip
     both = table.where(filters="both filters")
     left = [f"{row['damping']:g}" for row in both.records() if row["false collisions"]]
-    return Part(
+    return Part.of(
         "C18: false collisions of a ball that rolls in the faceted socket, at contact damping "
         f"{', '.join(f'{b:g}' for b in both['damping'])} N s/m and with filter distances above the "
-        f"{1e3 * EDGE_JUMP:.1f} mm between contacts on neighbouring facets: {counts}.",
+        f"{1e3 * EDGE_JUMP:.1f} mm between contacts on neighbouring facets", counts, "none with both filters",
         REFUTED if len(left) == len(both.rows) else MIXED if left else REPRODUCED,
         miss=f"false collisions remain at a damping of {', '.join(left)} N s/m" if left else "")  # fmt: skip
 

@@ -129,15 +129,16 @@ def findings(table: Table) -> Iterator[Part]:
     """Yield the parts on conservation, on erratum 3, and on the choice of rows."""
     relative = table.only(treatment != PER_BODY for treatment in table["treatment"])
     energy, momentum = max(map(abs, relative["energy change"])), max(relative["momentum change"])
-    yield Part(
-        f"Newton's cradles of 2 to 7 balls and Bernoulli's three balls: with relative rows (12), solved at once or "
-        f"event by event, energy changes by at most {energy:.1e} and momentum by at most {momentum:.1e} (tolerance "
-        f"{CONSERVED:g}).", REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
+    yield Part.of(
+        "Newton's cradles of 2 to 7 balls and Bernoulli's three balls, relative rows (12), solved at once or event by "
+        "event", f"energy changes by at most {energy:.1e}, momentum by at most {momentum:.1e}",
+        f"at most {CONSERVED:g}", REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
     per_body = table.where(treatment=PER_BODY)
     energy, least = max(map(abs, per_body["energy change"])), min(per_body["momentum change"])
-    yield Part(
-        f"With the per-body rows (13)-(14) energy changes by at most {energy:.1e}, but momentum always by at least "
-        f"{least:.2g} times its value: the striking ball rebounds as from a wall (erratum 3).",
+    yield Part.of(
+        "The same with the per-body rows (13)-(14), erratum 3",
+        f"energy changes by at most {energy:.1e}, but momentum always by at least {least:.2g} times its value: the "
+        "striking ball rebounds as from a wall", "momentum changes, as erratum 3 says",
         REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
     if five := table.where(problem="cradle of 5").records():
         yield _rows_decide(five)
@@ -151,10 +152,10 @@ def _rows_decide(five: Sequence[Row]) -> Part:
              for name, choice in choices.items()}  # fmt: skip
     words = "; ".join(f"{name} ({', '.join(f'{v + 0.0:.1f}' for v in values)})" for name, values in after.items())
     apart = min(float(np.abs(a - b).max()) for a, b in combinations(after.values(), 2))
-    return Part(
-        "Conservation laws do not determine the outcome; it depends on which contacts enter the collision. Velocities "
-        f"of five balls after the impact: {words} m/s. The paper uses the contacts that approach. Only solving the "
-        "contacts one after the other passes the impulse to the last ball.",
+    return Part.of(
+        "Conservation laws do not determine the outcome; it depends on which contacts enter the collision",
+        f"velocities of five balls after the impact: {words} m/s. The paper uses the contacts that approach. Only "
+        "solving the contacts one after the other passes the impulse to the last ball", "outcomes that differ",
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
 
 

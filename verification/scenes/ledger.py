@@ -88,16 +88,17 @@ def _of_contacts(table: Table) -> Iterator[Part]:
     ratio, scene = max((row["most penetration"] / row["thinnest moving shape"], row["scene"]) for row in rows
                        if row["most contacts in one step"])
     deepest, most = _most(rows, "most penetration"), _most(rows, "most rows in one impact")
-    yield Part(
-        f"Bodies overlap by at most {deepest['most penetration']:.2f} mm ({deepest['scene']}), and by at most "
-        f"{ratio:.0%} of the thinnest moving shape of the scene ({scene}).", REPRODUCED if ratio < DEEP else MIXED)
+    yield Part.of(
+        "Deepest overlap of bodies", f"{deepest['most penetration']:.2f} mm ({deepest['scene']}), at most {ratio:.0%} "
+        f"of the thinnest moving shape of the scene ({scene})", f"below {DEEP:.0%} of that shape",
+        REPRODUCED if ratio < DEEP else MIXED)
     gained = max(table.column(_ADDED))
-    yield Part(
-        f"In {sum(table.column('impacts'))} impacts of the scenes as their files are, with up to "
-        f"{most['most rows in one impact']} rows at once ({most['scene']}), the largest energy gain, summed in "
-        f"doubles, is {gained:.0e} of the energy exchanged.", REPRODUCED if gained <= ROUNDING else REFUTED)
+    yield Part.of(
+        f"Largest energy gain of {sum(table.column('impacts'))} impacts, with up to "
+        f"{most['most rows in one impact']} rows at once ({most['scene']})",
+        f"{gained:.0e} of the energy exchanged, summed in doubles", f"at most {ROUNDING:.0e}", REPRODUCED if gained <= ROUNDING else REFUTED)
     complete = sum(not row["how it ends"].startswith(STOPPED) for row in rows)
-    yield Part(f"{complete} of {len(rows)} runs complete.", REPRODUCED if complete == len(rows) else REFUTED)
+    yield Part.of("Runs that complete", f"{complete} of {len(rows)}", "all", REPRODUCED if complete == len(rows) else REFUTED)
 
 
 def _most(rows: Sequence[Row], key: str) -> Row:
@@ -116,13 +117,14 @@ def _of_books(table: Table) -> Part:
     rows = table.records()
     made = sorted((row for row in rows if row[GAIN_SHARE] * row["energy exchanged"] > 100 * rounding_of(row)),
                   key=lambda row: float(row[GAIN_SHARE]), reverse=True)
-    words = "".join(f", {row['scene']} {row[GAIN_SHARE]:.1f} %" for row in made)
-    return Part(
-        f"In {len(rows) - len(made)} of {len(rows)} scenes the stored energy never exceeds the energy at the start "
-        "plus the work done on the scene"
-        + (f". In the others time stepping, not the impacts, creates energy at some instant, by these shares of the "
-           f"energy exchanged: {words[2:]}" if made else "") + ".",
-        MIXED if made else REPRODUCED)
+    words = ", ".join(f"{row['scene']} {row[GAIN_SHARE]:.1f} %" for row in made)
+    return Part.of(
+        "The stored energy never exceeds the energy at the start plus the work done on the scene",
+        f"{len(rows) - len(made)} of {len(rows)} scenes"
+        + (f". In the others time stepping, not the impacts, creates energy at some instant: {words} of the energy "
+           "exchanged" if made else ""), "all scenes", MIXED if made else REPRODUCED,
+        miss=f"time stepping creates energy in {len(made)} of {len(rows)} scenes ({words} of the energy exchanged)"
+             if made else "")
 
 
 def _of_residuals(table: Table) -> Iterator[Part]:
@@ -132,18 +134,17 @@ def _of_residuals(table: Table) -> Iterator[Part]:
     short = [row for row in tried if not as_declared(row)]
     orders = sorted(float(row["order measured"]) for row in tried)
     below = ", ".join(f"{row['scene']} ({row['order measured']:.2f})" for row in short)
-    yield Part(
-        f"The residual of the energy balance is rounding in {len(rows) - len(tried)} scenes. In the other "
-        f"{len(tried)} it falls as the step is shortened, with measured orders from {orders[0]:.2f} to "
-        f"{orders[-1]:.2f} (median {float(np.median(orders)):.2f}); the integrator declares order "
-        f"{max(row['order declared'] for row in tried)}."
-        + (f" Below the declared order: {below}." if short else ""), MIXED if short else REPRODUCED)
+    yield Part.of(
+        "The residual of the energy balance is rounding, or falls as the step is shortened",
+        f"rounding in {len(rows) - len(tried)} scenes; orders from {orders[0]:.2f} to {orders[-1]:.2f} (median "
+        f"{float(np.median(orders)):.2f}) in {len(tried)}" + (f". Below the declared order: {below}" if short else ""),
+        f"order {max(row['order declared'] for row in tried)}, which the integrator declares", MIXED if short else REPRODUCED)
     wide = sorted((row for row in rows if row[OPEN] > WORTH_NAMING), key=lambda row: float(row[OPEN]), reverse=True)
-    said = "".join(f", {row['scene']} {row[OPEN]:.1f} %" for row in wide)
-    yield Part(
-        f"At the scene's own time step the residual exceeds {WORTH_NAMING:.0f} % of the energy exchanged in "
-        f"{len(wide)} of {len(rows)} scenes (absolute values of motion and springs added)"
-        f"{said and ':' + said[1:]}.", MIXED if wide else REPRODUCED,
+    said = ", ".join(f"{row['scene']} {row[OPEN]:.1f} %" for row in wide)
+    yield Part.of(
+        "Residual at the scene's own time step, absolute values of motion and springs added",
+        f"larger in {len(wide)} of {len(rows)} scenes{said and ': ' + said}",
+        f"at most {WORTH_NAMING:.0f} % of the energy exchanged", MIXED if wide else REPRODUCED,
         miss=f"time stepping leaves up to {wide[0][OPEN]:.1f} % of a scene's energy unaccounted for "
              f"({wide[0]['scene']})" if wide else "")
 

@@ -189,11 +189,11 @@ def coupled(ports: Table) -> Part:
     for row in ports.where(world=COUPLER_WORLD).records():
         case = row["the hand"], row["sensors"] == "ideal"
         most[case] = max(most.get(case, 0.0), row["needed / bound"])
-    return Part(
-        "In CBuc, with the tool on a rigid wall, a pressing hand and ideal sensors, the device is passive from "
-        f"{most[PRESSES, True]:.4f} times the damping b = KT/2 + |B| that Colgate's bound predicts. Late or coarse "
-        f"sensors need up to {most[PRESSES, False]:.3g} times that damping. A hand that moves in and out of contact "
-        f"needs up to {most[CROSSES, True]:.3g} times, because the coupler is already stretched when it switches on.",
+    return Part.of(
+        "Damping for a passive device in CBuc, with the tool on a rigid wall, over Colgate's bound b = KT/2 + |B|",
+        f"{most[PRESSES, True]:.4f} with a pressing hand and ideal sensors. Late or coarse sensors need up to "
+        f"{most[PRESSES, False]:.3g}. A hand that moves in and out of contact needs up to {most[CROSSES, True]:.3g}, "
+        "because the coupler is already stretched when it switches on", "at most 1",
         MIXED if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
@@ -201,13 +201,11 @@ def coordinated(ports: Table) -> Part:
     """Return the part on the additional damping that the four-channel controller needs."""
     found = ports.only(world != COUPLER_WORLD for world in ports["world"])
     needed, sums = found["damping needed"], found["with the coordination's gains"]
-    return Part(
-        "With the four-channel controller the bound KT/2 + |B| of the wall alone is not enough: the device needs "
-        f"{min(needed):.3g} to {max(needed):.3g} N s/m, up to {max(found['needed / bound']):.3g} times the bound, "
-        f"because the hand also feels the coupling's {COORDINATION[1]:g} N s/m. With the coupling's gains added to "
-        f"those of the wall, the bound is nearly enough: up to {max(map(truediv, needed, sums)):.3g} times its value "
-        "is needed. Colgate's bound does not apply here because the tool moves. The paper's "
-        "device has no damping.", MIXED)
+    return Part.of(
+        "Damping for a passive device with the four-channel controller, over the bound KT/2 + |B| of the wall alone",
+        f"up to {max(found['needed / bound']):.3g}: {min(needed):.3g} to {max(needed):.3g} N s/m, because the hand "
+        f"also feels the coupling's {COORDINATION[1]:g} N s/m. With the coupling's gains added to the bound up to "
+        f"{max(map(truediv, needed, sums)):.3g}. The bound does not apply because the tool moves", "at most 1", MIXED)
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:

@@ -53,10 +53,10 @@ def peg(pegs: Table) -> Part:
     times = [tuple(np.inf if row["settles after"] is None else row["settles after"] for row in pair) for pair in pairs]
     sooner = [None if np.isinf(min(pair)) else bool(pair[1] <= pair[0]) for pair in times]
     fewer = sum(ours["bounces"] <= theirs["bounces"] for theirs, ours in pairs)
-    return Part(
-        f"With impulses the peg in the corner comes to rest no later than with penalties in {sooner.count(True)} of "
-        f"{len(sooner) - sooner.count(None)} combinations of device and wall in which it comes to rest at all, and "
-        f"bounces no more often in {fewer} of {len(pairs)}.", verdict_of_trials(sooner))
+    return Part.of(
+        "With impulses the peg in the corner comes to rest no later than with penalties",
+        f"in {sooner.count(True)} of {len(sooner) - sooner.count(None)} combinations of device and wall in which it "
+        f"comes to rest at all; bounces no more often in {fewer} of {len(pairs)}", "in all", verdict_of_trials(sooner))
 
 
 def _pulse(study: Study, name: str) -> dict[str, Any]:

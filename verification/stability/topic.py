@@ -55,16 +55,17 @@ def _of_maps(table: Table) -> Iterator[Part]:
     passive = (b - 0.5 * K * (1.0 / rate))[:, None] >= damping
     damped, bare = ideal & (b > 0.0), ideal & (b == 0.0)
     gains = int((passive & (theirs == GROWS))[damped].sum())
-    yield Part(
-        f"Colgate's condition b >= KT/2 + |B| says that {passive[damped].sum()} walls are passive; {gains or 'none'} "
-        f"of them accelerated the hand. A further {(~passive & (theirs == SETTLES))[damped].sum()} walls settle "
-        "although the condition fails: it is for the worst hand, ours is a constant force.",
+    yield Part.of(
+        "Walls that Colgate's condition b >= KT/2 + |B| calls passive, and that accelerated the hand",
+        f"{gains or 'none'} of {passive[damped].sum()}. A further {(~passive & (theirs == SETTLES))[damped].sum()} "
+        "walls settle although the condition fails: it is for the worst hand, ours is a constant force", "none",
         REFUTED if gains else REPRODUCED)
     shares = ", ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
                        for one in dict.fromkeys(rate[bare].tolist()))
-    yield Part(
-        "The paper's device has no damping, b = 0. Then the condition holds for no wall. With a constant force as "
-        f"the hand, penalties are still stable on {shares} of these walls.", MIXED)
+    yield Part.of(
+        "The paper's device has no damping, b = 0, so the condition holds for no wall",
+        f"with a constant force as the hand, penalties are still stable on {shares} of these walls", "passive walls",
+        MIXED)
 
 
 def _held(table: Table, theirs: np.ndarray, ours: np.ndarray) -> Part:
@@ -77,6 +78,8 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray) -> Part:
         f"({min(more):.2f} to {max(more):.2f} times as many, by sampling rate, sensor and damping of the device). "
         f"Impulses destabilise {lost} walls.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
+        asked="Stable walls with impulses, and without", target="more with, and none lost",
+        measured=f"{ours.sum()} and {theirs.sum()} of {theirs.size:,}; {lost} are stable only without",
         miss=f"impulses destabilise {lost} of {theirs.size:,} walls (pairs of stiffness and damping)" if lost else "")
 
 
@@ -102,10 +105,10 @@ def _hard(table: Table) -> Part:
         np.median(np.divide(*(np.array(one.column(key)) for one in of_law[::-1])).reshape(-1, size), axis=1)
         for key in ("rate-hardness", "penetration")
     )
-    return Part(
-        f"At the paper's wall damping of {PAPER_DAMPING:g} N s/m the rate-hardness with impulses is {min(harder):.3g} "
-        f"to {max(harder):.3g} times that with penalties (median over stiffnesses), and the penetration "
-        f"{min(deeper):.2f} to {max(deeper):.2f} times.",
+    return Part.of(
+        f"Rate-hardness and penetration at the paper's wall damping of {PAPER_DAMPING:g} N s/m, impulses over penalties",
+        f"{min(harder):.3g} to {max(harder):.3g} times as hard (median over stiffnesses), {min(deeper):.2f} to "
+        f"{max(deeper):.2f} times as deep", "harder, no deeper",
         REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)
 
 

@@ -1,7 +1,9 @@
-// Added to a page that is complete without it: a cursor that reads values, legends that hide curves, film controls, print.
+// Added to a page that is complete without it: a cursor that reads values, legends that hide curves, sliders.
 const numbers = (text) => text.split(" ").map(Number);
 const add = (parent, name, properties) => parent.appendChild(Object.assign(document.createElement(name), properties));
 const told = (value, range) => value.toFixed(Math.min(Math.max(0, 3 - Math.floor(Math.log10(Math.abs(range)))), 7)).replace("-", "−");
+const controlsOf = (figure, where) => figure.querySelector(".panels").insertAdjacentElement(where,
+  Object.assign(document.createElement("div"), { className: "controls" }));
 
 // A drawing over time: its frame [left, top, right, bottom] in points, the limits of its axes, and the points of its curves.
 function plotOf(svg) {
@@ -22,8 +24,7 @@ function heightAt(points, x) {
 
 // Show the value of every curve at a share of the time axis.
 function read({ svg, frame: [left, top, right, bottom], x, y, curves, readout, line, name }, share) {
-  const { width, height } = svg.viewBox.baseVal;
-  const place = left + share * (right - left);
+  const { width, height } = svg.viewBox.baseVal, place = left + share * (right - left);
   const heights = curves.filter((curve) => !curve.group.hasAttribute("hidden")).map((curve) => [curve.name, heightAt(curve.points, place)]);
   const rows = heights.filter(([, at]) => at !== undefined)
     .map(([curve, at]) => [curve, told(y[0] + ((at - bottom) / (top - bottom)) * (y[1] - y[0]), y[1] - y[0])]);
@@ -48,26 +49,28 @@ document.querySelectorAll("figure").forEach((figure) => {
     svg.addEventListener("pointerleave", () => plots.forEach(({ readout, line }) => { readout.hidden = line.hidden = true; }));
   }
   if (figure.querySelector("[data-trace]")) figure.querySelectorAll(".legend li[data-curve]").forEach((entry) => {
-    const parts = [...entry.childNodes];
     const button = add(entry, "button", { type: "button", title: `Hide or show ${entry.dataset.curve}`, ariaPressed: "true" });
-    button.append(...parts);
+    button.append(...[...entry.childNodes].slice(0, -1));
     button.addEventListener("click", () => {
       button.ariaPressed = `${button.ariaPressed !== "true"}`;
       figure.querySelectorAll("svg [data-curve], svg [data-name]").forEach((part) => {
-        const own = [part.dataset.curve, part.dataset.name].includes(entry.dataset.curve);
-        if (own) part.toggleAttribute("hidden", button.ariaPressed !== "true");
+        if ([part.dataset.curve, part.dataset.name].includes(entry.dataset.curve)) part.toggleAttribute("hidden", button.ariaPressed !== "true");
       });
     });
   });
+  const [states, films] = ["[data-state]", "svg[data-duration]"].map((each) => [...figure.querySelectorAll(each)]);
+  if (states.length) { // pictures, of which a slider shows one
+    const { state: value } = states.find((state) => !state.hasAttribute("display")).dataset;
+    const slider = add(add(controlsOf(figure, "beforebegin"), "label", { textContent: "Tilt" }), "input",
+      { type: "range", min: 0, max: states.at(-1).dataset.state, value });
+    slider.addEventListener("input", () => states.forEach((state) => state.setAttribute("display", state.dataset.state === slider.value ? "inline" : "none")));
+  }
+  if (films.length) play(films, controlsOf(figure, "afterend"));
 });
 
 // The films of a figure share one slider; without this script they play by themselves, again and again.
-document.querySelectorAll("figure.player").forEach((figure) => {
-  const films = [...figure.querySelectorAll("svg[data-duration]")];
+function play(films, controls) {
   const [end, slower, start] = ["duration", "slower", "start"].map((name) => +films[0].dataset[name]);
-  const controls = document.createElement("div");
-  controls.className = "controls";
-  figure.querySelector(".panels").after(controls);
   const button = add(controls, "button", { type: "button" });
   const slider = add(controls, "input", { type: "range", min: 0, max: end, step: end / 1000, ariaLabel: "Time" });
   const clock = add(controls, "output", {});
@@ -80,24 +83,15 @@ document.querySelectorAll("figure.player").forEach((figure) => {
     if (time >= end) { pause(); seek(end); } else { tell(time); requestAnimationFrame(follow); }
   };
   button.addEventListener("click", () => {
-    if (!films[0].animationsPaused()) { pause(); return; }
+    if (!films[0].animationsPaused()) return pause();
     if (+slider.value >= end) seek(start);
     films.forEach((film) => film.unpauseAnimations());
     button.textContent = "❚❚ Pause";
     requestAnimationFrame(follow);
   });
   slider.addEventListener("input", () => { pause(); seek(+slider.value); });
-  pause();
-  seek(start);
-});
-
-// Paper cannot be unfolded: what a browser keeps closed in print is opened for it, and closed again afterwards.
-let opened = [];
-window.addEventListener("beforeprint", () => {
-  opened = [...document.querySelectorAll("details.claim:not([open]), details.proof:not([open], .runs-of), figure > details:not([open])")];
-  opened.forEach((details) => { details.open = true; });
-});
-window.addEventListener("afterprint", () => opened.forEach((details) => { details.open = false; }));
+  pause(), seek(start);
+}
 
 // A link into something folded unfolds it.
 const unfold = () => {
@@ -105,5 +99,4 @@ const unfold = () => {
   for (let place = target; place; place = place.parentElement) if (place.tagName === "DETAILS") place.open = true;
   if (target) target.scrollIntoView();
 };
-window.addEventListener("hashchange", unfold);
-unfold();
+window.addEventListener("hashchange", unfold), unfold();
