@@ -21,8 +21,8 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
     same = sum(repetition.same for _, repetition in repeated)
     part = Part(f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated again from "
-                "their own files alone.", REPRODUCED if same == len(repeated) else REFUTED, asked="Runs of the figures that repeat from their "
-                "files alone", measured=f"{same} of {len(repeated)}", target="all, to the last bit")  # fmt: skip
+                "their own files alone.", REPRODUCED if same == len(repeated) else REFUTED, target="all",
+                asked="Runs of the figures that repeat to the last bit", measured=f"{same} of {len(repeated)}")
     table = titled(("run", "content hash stored", "simulated again", "differs in"), [
         (name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
         for name, one in repeated])  # fmt: skip

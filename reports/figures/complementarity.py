@@ -1,8 +1,7 @@
-"""IAPB against complementarity: where their motions agree, the time of impacts and steps, and the solvers' success."""
+"""IAPB against complementarity: where their motions agree, and how the ideal world converges."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from reports.figures.figure import Drawn, Panel, recipe
@@ -14,14 +13,11 @@ from reports.figures.style import (
     MUTED,
     OUTCOMES,
     PAPER,
-    STYLES,
     VERMILION,
-    LineStyle,
     line_arguments,
     looks_of,
 )
-from verification.cost.calls import PRINTED
-from verification.table import Table, titled
+from verification.table import Table
 
 Rows = list[dict[str, Any]]
 
@@ -109,83 +105,6 @@ def where_to_stop(numbers: Table) -> Drawn:
     return Drawn(panels, numbers, looks, {
         "limit": limit, "wrong": f"{wrong:.0f}", "pushed": max(row["pushing from the LCP"] for row in rows),
         "least": f"{min(prices):.2g}", "most": f"{max(prices):.2g}"})  # fmt: skip
-
-
-# At most six curves; the table has all solvers. In the table, "IAPB" is the engine called from Python.
-TIMED = {
-    "IAPB kernel": STYLES["IAPB kernel"], "Lemke kernel": STYLES["Lemke kernel"], "IAPB": STYLES["IAPB, Python"],
-    PRINTED: STYLES["printed, numpy"], "gauss_seidel": STYLES["gauss_seidel"],
-    "daqp": STYLES["daqp"],
-}
-
-
-@recipe("cost-of-contacts", "complementarity/time per impact", "complementarity/time per step")
-def cost_of_contacts(numbers: Table, steps: Table) -> Drawn:
-    """Draw a panel for each family of impacts, and one for the time of a step."""
-    solvers = sorted(dict.fromkeys(numbers.column("solver")), key=lambda name: name not in TIMED)[: len(TIMED)]
-    styles = looks_of(solvers) | {name: TIMED[name] for name in solvers if name in TIMED}
-    most = max(numbers.column("contacts"))
-    panels = []
-    for family in dict.fromkeys(numbers.column("impacts")):
-        rows = numbers.where(impacts=family).records()
-        top = 3.0 * max(row["largest"] for row in rows if row["largest"] is not None)
-        with Plot(f"cost-of-contacts-{family}", (4.6, 3.9)) as plot:
-            for name, style in styles.items():
-                mine = [row for row in rows if row["solver"] == name]
-                timed = [row for row in mine if row["median"] is not None]
-                at = [row["contacts"] for row in timed]
-                plot.axes.fill_between(at, [row["least"] for row in timed], [row["largest"] for row in timed],
-                                       color=style.color, alpha=0.13, linewidth=0)  # fmt: skip
-                plot.curve([(row["contacts"], row["median"]) for row in timed], style)
-                for mark, size, places in (
-                    ("x", 10, [(row["contacts"], row["median"]) for row in timed if row["outcome"] == "failed"]),
-                    ("^", 6, [(row["contacts"], top) for row in mine if row["median"] is None]),
-                ):  # fmt: skip
-                    plot.curve(places, LineStyle(style.color, mark, width=0.0), markersize=size, markeredgewidth=1.8,
-                               markeredgecolor=style.color, zorder=5)  # fmt: skip
-            plot.log("contacts", "time of one impact [µs]")
-            plot.ticks("x", sorted({row["contacts"] for row in rows}))
-        words = ", ".join(f"{row['solver']} {row['median']:.3g}" for row in rows
-                          if row["contacts"] == most and row["median"] is not None)  # fmt: skip
-        alt = f"Median times of a {family} of {most} contacts in microseconds: {words}."
-        panels.append(Panel(plot.svg, alt, family))
-    ways, scenes = (list(dict.fromkeys(steps.column(name))) for name in ("world", "scene"))
-    with Plot("cost-of-contacts-steps", (4.6, 2.4)) as plot:
-        for number, (scene, style) in enumerate(looks_of(scenes).items()):
-            for row in steps.where(scene=scene).records():
-                y = ways.index(row["world"]) + 0.24 * (number - (len(scenes) - 1) / 2)
-                plot.axes.plot([row["least"], row["largest"]], [y, y], color=style.color, linewidth=1.2)
-                plot.marks([(row["median"], y)], replace(style, name=""), markersize=5)
-            plot.axes.plot([], [], style.marker, color=style.color, label=scene)
-        plot.log("time of one step, over IAPB's compiled", "", "x", ylim=(len(ways) - 0.4, -0.6))
-        plot.axes.set_yticks(range(len(ways)), ways)
-        plot.axes.legend(loc="upper right", fontsize=8)
-    words = ", ".join(f"{row['scene']} {row['world']} {row['median']:.3g}" for row in steps.records())
-    panels.append(Panel(plot.svg, f"Median times of one step, in times IAPB's compiled: {words}.",
-                        "one step of a world"))
-    return Drawn(panels, numbers, {look.name: look for look in styles.values()})
-
-
-@recipe("performance-profile", "complementarity/profile")
-def performance_profile(numbers: Table) -> Drawn:
-    """Draw a panel for each collection and kind of problem; the solvers of each kind have their own numbering."""
-    panels, rows, legend = list[Panel](), list[tuple[Any, ...]](), dict[str, LineStyle]()
-    for kind, collection in dict.fromkeys(numbers.select(("kind", "collection")).rows):
-        here, words = numbers.where(kind=kind, collection=collection), []
-        looks = looks_of(name for name in numbers.where(kind=kind).column("solver") if name in STYLES)
-        legend |= looks
-        with Plot(f"performance-profile-{collection.replace(' ', '-')}-{kind}", (4.4, 3.2)) as plot:
-            for number, solver in enumerate(dict.fromkeys([*looks, *here.column("solver")])):
-                if curve := here.where(solver=solver).select(("factor", "share solved")).rows:
-                    words.append(f"{solver} {curve[-1][1]:.0%}")
-                    rows.append((collection, kind, solver, curve[0][1], curve[-1][1]))
-                    if solver in looks:
-                        plot.curve(curve, looks[solver], drawstyle="steps-post", markevery=(number % 5, 9))
-            plot.log("factor of the fastest solver's time", "share of problems solved", "x", ylim=(-0.02, 1.03))
-            plot.ticks("y", [0.0, 0.25, 0.5, 0.75, 1.0])
-        panels.append(Panel(plot.svg, f"Shares solved at all: {', '.join(words)}.", f"{collection}, {kind}"))
-    ends = ("share as the fastest", "share solved at all")
-    return Drawn(panels, titled(("collection", "kind", "solver", *ends), rows, 3, timed=ends), legend)
 
 
 _ROUNDING = 1e-12  # smaller errors count as none

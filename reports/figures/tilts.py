@@ -23,7 +23,7 @@ from verification.table import titled
 
 MILLI = 1e3
 CURVES = {"ideal": "rigid wall (ideal)", "IAPB": "impulse, then spring (IAPB)", "PB": "spring only (PB)",
-          "CBuc": "rigid wall, felt through a spring (CBuc)"}  # fmt: skip
+          "CBuc": "rigid wall felt through a spring (CBuc)"}  # fmt: skip
 _WINDOW = (-16.6, -8.6), (3.4, 9.2)  # [mm] to the right, upwards: from before the first contact to rest, at all tilts
 _SIZES = (4.5, 2.1), (4.5, 3.7)  # inches
 _FRAME = (0.085, 0.115, 0.905, 0.797)  # of the second picture: equal scales, and room for two lines above
@@ -38,18 +38,19 @@ def hero(tilted: Mapping[float, Mapping[str, Run]]) -> Drawn:
     found = {tilt: _judged(tilt, runs) for tilt, runs in tilted.items()}
     rigid, shown = {tilt: runs["ideal"] for tilt, runs in tilted.items()}, min(tilted, key=_from_start)
     scene = rigid[shown].scene_resolved
-    corners = np.vstack([ring for run in rigid.values() for k in (0, -1) for ring in body_outlines(scene, run.pose[k])])
-    with Canvas("hero-scene", np.minimum(corners.min(axis=0), 0) - _AROUND, np.maximum(corners.max(axis=0), 0) + _AROUND,
-                _SIZES[0], turned=True) as canvas:  # fmt: skip
+    corners = [ring for run in rigid.values() for k in (0, -1) for ring in body_outlines(scene, run.pose[k])]
+    low, high = (end([*np.vstack(corners), np.zeros(2)], axis=0) for end in (np.min, np.max))
+    with Canvas("hero-scene", low - _AROUND, high + _AROUND, _SIZES[0], turned=True) as canvas:
         canvas.walls(scene)
         canvas.scale_bar((0.046, 0.0042), 0.01, "10 mm")
         force = np.asarray(scene["hand"]["force"][:2])
-        canvas.named_arrow(np.array([0.05, -0.027]), 0.013 * force, f"hand, {np.hypot(*force):.2f} N")
+        canvas.named_arrow(np.array([high[0], low[1] + 0.002]), 0.013 * force, f"hand, {np.hypot(*force):.2f} N")
     with Plot("hero-paths", _SIZES[1], frames=[_FRAME]) as paths:
         paths.axes.set(xlim=_WINDOW[0], ylim=_WINDOW[1], xlabel="to the right, wall at 0 [mm]",
                        ylabel="above the floor [mm]")  # fmt: skip
     moves = _states(shown, {tilt: _motion(canvas, run) for tilt, run in rigid.items()})
-    curves = _states(shown, {tilt: _told(tilt, found[tilt]) + "".join(_curve(paths, name, runs[name]) for name in CURVES)
+    curves = _states(shown, {tilt: "".join((_told(tilt, found[tilt]), *(_curve(paths, name, runs[name])
+                                                                        for name in CURVES)))
                              for tilt, runs in tilted.items()})  # fmt: skip
     rows = tuple((np.degrees(tilt), *(MILLI * each[ALL_THREE][name] for name in WORLDS),
                   *(_nearest(each[part]) for part in NAMED)) for tilt, each in found.items())  # fmt: skip
@@ -127,7 +128,7 @@ def _line(plot: Plot, points: Any) -> str:
     line = Path(_places(plot, points))
     line.should_simplify, line.simplify_threshold = len(points) > 4, _SMOOTH
     kept = line.cleaned(simplify=line.should_simplify)
-    places = kept.vertices[kept.codes != Path.STOP].round().astype(int)
+    places = np.asarray(kept.vertices)[kept.codes != Path.STOP].round().astype(int)
     moves = np.diff(places, axis=0)
     steps = " ".join(f"{x} {y}" for x, y in moves[moves.any(axis=1)])
     return f"M{places[0][0]} {places[0][1]}l{steps}".replace(" -", "-")

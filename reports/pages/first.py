@@ -13,7 +13,7 @@ from typing import NamedTuple
 from reports.pages.quantities import peg_step
 from reports.pages.records import Evidence
 from verification.claims.conditions import Condition
-from verification.claims.peg import ALL_THREE, LARGE, NAMED, closest_at, small_tilts
+from verification.claims.peg import ALL_THREE, LARGE, closest_at, small_tilts
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
@@ -81,8 +81,8 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
 def made_from(evidence: Evidence) -> str:
     """Return commit, date and machine of the report, "" if they are unknown."""
     known = evidence.provenance
-    return ", ".join([f"commit {known['commit'][:12]}"] * ("commit" in known)
-                     + [known[name] for name in ("date", "cpu") if name in known])  # fmt: skip
+    commit = f"commit {known['commit'][:12]}" if "commit" in known else ""
+    return ", ".join(filter(None, (commit, known.get("date"), known.get("cpu"))))
 
 
 def _forces(claim: Finding | None) -> Iterator[tuple[bool, str]]:
@@ -119,7 +119,8 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
     if step := peg_step(evidence):
         yield f"One step of the corner scene takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
-        yield f"A step at rest takes {min(races['ratio']):.2g} to {max(races['ratio']):.2g} times as long as in the engine MuJoCo."
+        least, most = (f"{end(races['ratio']):.2g}" for end in (min, max))
+        yield f"A step at rest takes {least} to {most} times as long as in the engine MuJoCo."
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
         yield f"Lemke's complementarity method is faster in {raced.holds.count(False)} of {len(raced.decided)} impacts."
 

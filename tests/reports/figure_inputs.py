@@ -13,7 +13,9 @@ import numpy as np
 from iapb import find_scene, load_scene
 from iapb.run import Run
 from iapb.scene.mechanism import mechanism_of
-from reports.figures import RECIPES, complementarity, energy_gains, mechanics
+from reports.evidence.runs import TILTED
+from reports.figures import RECIPES, energy_gains, mechanics
+from reports.figures.corner import UNLIMITED
 from reports.figures.paper import arm_energies
 from verification.cost.accuracy import WAYS
 from verification.cost.calls import PRINTED
@@ -43,18 +45,6 @@ def tables() -> dict[str, Table]:
             "pushing from the LCP; time of (21) [µs]; time of pushing [µs]", (
                 (rows, c, 1.0 * (c < 6), 6, 0.0 if c < 6 else 0.1 * c**0.3, 1e-16, 40.0 + c, 300.0 + c * c)
                 for rows in ("approaching", "touching") for c in (5, 12, 40, 150))),
-        "complementarity/time per impact": (
-            "impacts; contacts; solver; outcome; median [µs]; least [µs]; largest [µs]", (
-            (family, c, solver, "failed" if lost else "solved", t if c < 300 or k else None, 0.9 * t, 1.1 * t)
-            for family in ("patch", "pile") for k, solver in enumerate((*complementarity.TIMED, "quadprog"))
-            for c in (1, 8, 64, 300) for t, lost in [((k + 1) * 3.0**k * c**0.8, k == 4 and c == 64)])),
-        "complementarity/time per step": ("scene; world; median; least; largest", (
-            (scene, world, t, 0.9 * t, 1.2 * t) for m, scene in enumerate(("peg_corner", "peg_hole"))
-            for k, world in enumerate(("IAPB, compiled loop", "ideal (QP per step)")) for t in [10.0**k * (m + 1)])),
-        "complementarity/profile": ("collection; kind; solver; factor; share solved", (
-            ("own problems", kind, solver, factor, min(0.15 * k + 0.1 * m, 1.0))
-            for kind, solvers in (("frictionless", ("lemke", "daqp", "quadprog", "unnamed")), ("friction", ("nsgs",)))
-            for k, solver in enumerate(solvers) for m, factor in enumerate((1.0, 10.0, 100.0, 1e4)))),
         "complementarity/convergence": ("scene; step [ms]; error of positions; error of velocities", (
             (scene, h, 1e-4 * k * h, 2e-4 * k * h) for k, scene in enumerate(_SCENES) for h in (2.0, 1.0, 0.5))),
         "effect_costs": ("scene; effect; time saved [%]; error [mm]; best of its error", (
@@ -175,4 +165,6 @@ def all_inputs(make_run: Callable[..., Run]) -> dict[str, Any]:
     runs = {name: made_motion(make_run, scenes[name.split("/")[0]], k) for k, name in enumerate(needed)
             if name.split("/")[0] in scenes}  # fmt: skip
     given = {name: load_scene(find_scene(name[6:])).resolved() for name in needed if name.startswith("scene/")}
-    return {**runs, **given, **tables(), "arm_energies": arm_energies(), "machine": "a processor, report of today"}
+    tilted = {tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015)}
+    return {**runs, **given, **tables(), TILTED: tilted, "arm_energies": arm_energies(),
+            "machine": "a processor, report of today"}

@@ -155,7 +155,7 @@ def test_a_name_has_one_colour_and_one_marker_in_every_figure(gallery: Gallery) 
             assert look[0] == STYLES[name].color and look[1] in (STYLES[name].marker, "", "None"), name
         elif look in WORLDS and line.get_linestyle() != "None":
             raise AssertionError((name, look))
-    assert seen >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "Lemke", "daqp", "printed, numpy"}
+    assert seen >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "Lemke", "printed, numpy"}
     for figure in gallery.drawn:
         for text, look in figure.legend:
             assert (look.color, look.marker) == (STYLES.get(text, look).color, STYLES.get(text, look).marker), text

@@ -430,11 +430,13 @@ def _motions_say(motions: Table) -> Iterator[Part]:
         as_good = min((run["time"] for run in here if theirs and run["method"].startswith("IAPB")
                        and run["position"] <= theirs["position"]), default=inf)  # fmt: skip
         exact, fast = ours["position"] <= best[most]["position"], theirs is None or as_good <= theirs["time"]
-        text = ", ".join(f"{name} {_error(run)} in {run['time']:.3g} ms per simulated second"
+        text = ", ".join(f"{name} {_error(run)} ({run['time']:.3g} ms)"
                          for name, run in best.items())
         more = f"; IAPB reaches MuJoCo's smallest error in {as_good:.3g} ms" if as_good < inf else ""
-        yield target(f"Whole motion, {scene}: smallest position error, in lengths of the body", f"{text}{more}",
-                     "none more exact, and MuJoCo's error in less time", exact and fast, f"on the whole motion of {scene} " + (
+        yield target(f"Whole motion, {scene}: smallest position error in body lengths (time per simulated second)",
+                     f"{text}{more}",
+                     "none more exact, and MuJoCo's error in less time", exact and fast,
+                     f"on the whole motion of {scene} " + (
                          "another method is as exact in less time" if exact else
                          f"no time step makes IAPB as exact as {most} ({_error(ours)} against {_error(best[most])})"))
 

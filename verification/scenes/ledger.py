@@ -96,9 +96,11 @@ def _of_contacts(table: Table) -> Iterator[Part]:
     yield Part.of(
         f"Largest energy gain of {sum(table.column('impacts'))} impacts, with up to "
         f"{most['most rows in one impact']} rows at once ({most['scene']})",
-        f"{gained:.0e} of the energy exchanged, summed in doubles", f"at most {ROUNDING:.0e}", REPRODUCED if gained <= ROUNDING else REFUTED)
+        f"{gained:.0e} of the energy exchanged, summed in doubles", f"at most {ROUNDING:.0e}",
+        REPRODUCED if gained <= ROUNDING else REFUTED)
     complete = sum(not row["how it ends"].startswith(STOPPED) for row in rows)
-    yield Part.of("Runs that complete", f"{complete} of {len(rows)}", "all", REPRODUCED if complete == len(rows) else REFUTED)
+    yield Part.of("Runs that complete", f"{complete} of {len(rows)}", "all",
+                  REPRODUCED if complete == len(rows) else REFUTED)
 
 
 def _most(rows: Sequence[Row], key: str) -> Row:
@@ -138,7 +140,8 @@ def _of_residuals(table: Table) -> Iterator[Part]:
         "The residual of the energy balance is rounding, or falls as the step is shortened",
         f"rounding in {len(rows) - len(tried)} scenes; orders from {orders[0]:.2f} to {orders[-1]:.2f} (median "
         f"{float(np.median(orders)):.2f}) in {len(tried)}" + (f". Below the declared order: {below}" if short else ""),
-        f"order {max(row['order declared'] for row in tried)}, which the integrator declares", MIXED if short else REPRODUCED)
+        f"order {max(row['order declared'] for row in tried)}, which the integrator declares",
+        MIXED if short else REPRODUCED)
     wide = sorted((row for row in rows if row[OPEN] > WORTH_NAMING), key=lambda row: float(row[OPEN]), reverse=True)
     said = ", ".join(f"{row['scene']} {row[OPEN]:.1f} %" for row in wide)
     yield Part.of(

@@ -106,7 +106,7 @@ def _hard(table: Table) -> Part:
         for key in ("rate-hardness", "penetration")
     )
     return Part.of(
-        f"Rate-hardness and penetration at the paper's wall damping of {PAPER_DAMPING:g} N s/m, impulses over penalties",
+        f"Rate-hardness and penetration at the paper's wall damping of {PAPER_DAMPING:g} N s/m, impulses over springs",
         f"{min(harder):.3g} to {max(harder):.3g} times as hard (median over stiffnesses), {min(deeper):.2f} to "
         f"{max(deeper):.2f} times as deep", "harder, no deeper",
         REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)

@@ -15,7 +15,9 @@ from typing import Any
 import pytest
 
 from iapb.run import Run
+from reports.evidence.runs import TILTED
 from reports.figures import RECIPES
+from reports.figures.corner import UNLIMITED
 from reports.figures.paper import arm_energies
 from reports.pages.builder import build_report
 from reports.pages.records import Evidence
@@ -30,7 +32,7 @@ ARGUMENTS = (
     "--disable-component-update", "--disable-sync",
 )  # fmt: skip
 DESK, PHONE = (1400, 900), (400, 800)
-FIGURES = ("fig07", "fig08", "film-corner", "film-hole", "fig03")
+FIGURES = ("hero", "fig07", "fig08", "film-corner", "film-hole", "fig03")
 
 
 @dataclass
@@ -88,9 +90,10 @@ def evidence(make_run: Callable[..., Run]) -> Evidence:
     recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
     names = sorted({name for recipe in recipes for name in recipe.needs if "/" in name})
     runs = {name: made_motion(make_run, "peg_corner", k) for k, name in enumerate(names)}
+    tilted = {tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015, 0.3)}
     table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
     return Evidence(
-        inputs={**runs, "arm_energies": arm_energies()},
+        inputs={**runs, TILTED: tilted, "arm_energies": arm_energies()},
         claims=(finding_of("C01", "C01", "energy never rises", "half: $\\frac{1}{2}$",
                            (Part("p.", MIXED, "as printed"),), {"C01": table}),),
         topics=(finding_of("scene-ledger", "The scenes", "Asked.", "It holds.", (Part("It holds.", REPRODUCED),),

@@ -52,6 +52,15 @@ def test_the_cursor_reads_the_values_of_the_run(desk: Any, evidence: Evidence) -
     assert desk.page.locator("#fig07 .readout:visible").count() == 5  # the panels over time read together
 
 
+def test_the_slider_shows_one_tilt_at_a_time(see: Callable[..., Any], first: Path) -> None:
+    shown = """() => [...document.querySelectorAll("#hero [data-state]")].filter((each) => each.checkVisibility())
+        .map((each) => each.dataset.state)"""
+    with see(first) as desk:
+        assert desk.ask(shown) == ["1", "1"]  # the tilt of the scene, in both pictures
+        desk.page.locator("#hero input[type=range]").evaluate(TO_THE_END)
+        assert desk.ask(shown) == ["2", "2"] and desk.page.locator("#hero text", has_text="Tilt 17.19°").is_visible()
+
+
 def test_a_film_plays_stops_and_shows_the_poses_of_the_run(
     see: Callable[..., Any], first: Path, evidence: Evidence
 ) -> None:
