@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from matplotlib.path import Path
 
 from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, recipe
@@ -44,7 +43,8 @@ def hero(tilted: Mapping[float, Mapping[str, Run]]) -> Drawn:
         canvas.walls(scene)
         canvas.scale_bar((0.046, 0.0042), 0.01, "10 mm")
         force = np.asarray(scene["hand"]["force"][:2])
-        canvas.named_arrow(np.array([high[0], low[1] + 0.002]), 0.013 * force, f"hand, {np.hypot(*force):.2f} N")
+        corner = np.array([canvas.limits["xlim"][0] - 0.003, canvas.limits["ylim"][1] + 0.003])  # upper left
+        canvas.named_arrow(corner, 0.013 * force, f"hand, {np.hypot(*force):.2f} N")
     with Plot("hero-paths", _SIZES[1], frames=[_FRAME]) as paths:
         paths.axes.set(xlim=_WINDOW[0], ylim=_WINDOW[1], xlabel="to the right, wall at 0 [mm]",
                        ylabel="above the floor [mm]")  # fmt: skip
@@ -125,6 +125,8 @@ def _places(plot: Plot, points: Any) -> Floats:
 
 def _line(plot: Plot, points: Any) -> str:
     """Return the path data of a line: whole steps from point to point, without points that it does not need."""
+    from matplotlib.path import Path
+
     line = Path(_places(plot, points))
     line.should_simplify, line.simplify_threshold = len(points) > 4, _SMOOTH
     kept = line.cleaned(simplify=line.should_simplify)
