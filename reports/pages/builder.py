@@ -20,7 +20,6 @@ from reports.figures.figure import Figure, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, is_number
 from reports.pages.first import NEXT, facts, made_from
 from reports.pages.formulas import formula, prose
-from reports.pages.matrix import matrices, worst_first
 from reports.pages.records import Evidence, anchor, runs_by_user
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import explained
@@ -39,6 +38,7 @@ from verification.finding import (
     Finding,
     Part,
 )
+from verification.hard_cases.findings import ENGINE
 from verification.scenes.measures import COORDINATES
 from verification.table import Table
 
@@ -156,6 +156,15 @@ def ranked(found: Iterable[Any]) -> list[Any]:
     return sorted(found, key=lambda one: WORST_FIRST.index(one.verdict))
 
 
+def worst_first(cases: Iterable[Finding]) -> list[Finding]:
+    """Return the hard cases: those that the engine fails, then by the number of methods that fail, absent ones last."""
+    def rank(case: Finding) -> tuple[bool, bool, int]:
+        failing = [part.name for part in case.parts if part.verdict != REPRODUCED]
+        return not case.computed, not any(name in ENGINE for name in failing), -len(failing)
+
+    return sorted(cases, key=rank)
+
+
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
     failing, total = sum(part.verdict == REFUTED for part in topic.parts), len(topic.parts)
@@ -196,9 +205,9 @@ def _environment() -> Environment:
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
         judged=judged, badge_words=badge_words, counted=counted, tables_without=tables_without,
         runs_by_user=runs_by_user, anchor=anchor,
-        ranked=ranked, matrices=matrices, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
+        ranked=ranked, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )
-    environment.globals["rows_shown"] = ROWS_SHOWN
+    environment.globals |= {"rows_shown": ROWS_SHOWN, "engine": ENGINE}
     environment.tests["numeric"] = is_number
     return environment
 

@@ -1,17 +1,16 @@
-"""The hard cases' stage and matrix: every verdict is drawn as what it is, absent files are records, tables add up."""
+"""The hard cases' stage and page: every verdict is drawn as what it is, absent files are records, tables add up."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
 
-from reports.pages.matrix import matrices, worst_first
+from reports.pages.builder import worst_first
 from reports.pages.records import Evidence
 from reports.runner import Runner
 from tests.reports.joined import joined
-from verification.finding import Finding, finding_of
+from verification.finding import Finding
 from verification.hard_cases import findings
 from verification.hard_cases.findings import STABLE
 from verification.table import Table, table_from
@@ -47,31 +46,13 @@ def test_every_case_is_a_record_with_a_row_for_each_method(cases: tuple[Finding,
     assert len(summary(cases).rows) == sum(len(case.parts) for case in cases)
 
 
-def test_the_matrix_shows_every_case_and_method(cases: tuple[Finding, ...]) -> None:
-    impacts, motions = matrices(summary(cases))
-    title, methods, rows = impacts
-    assert (title, motions[0]) == ("Impacts, by method", "Motions, by world")
-    assert methods[0] == "factored" and motions[1][0] == "IAPB"
-    assert {case for case, _ in rows} == {cases[0].title, cases[1].title}
-    gains = dict(rows)[cases[1].title][methods.index("gram_cholesky")]
-    assert gains is not None and gains[:3] == ("✕", "bad", "gains energy")
+def test_the_page_ranks_the_cases_that_the_engine_fails_first(cases: tuple[Finding, ...]) -> None:
+    def case(name: str, ours: str, other: str = STABLE) -> Finding:
+        rows = [{"method": "factored", "outcome": ours}, {"method": "svd", "outcome": other}]
+        return findings.finding_on(name, name, table_from(rows), {})
 
-
-def test_what_we_fail_stands_first_then_the_largest_share_of_what_is_allowed() -> None:
-    def rows(case: str, outcome: str, error: float, other: str = STABLE) -> list[dict[str, object]]:
-        same = {"case": case, "kind": "impact", "energy gain": None, "gain allowed": 1.0, "error allowed": 1e-10}
-        return [same | {"method": "factored", "outcome": outcome, "forward error": error},
-                same | {"method": "svd", "outcome": other, "forward error": 1.0}]
-
-    found = table_from([*rows("calm", STABLE, 1e-16), *rows("close", STABLE, 9e-11),
-                        *rows("others fail", STABLE, 1e-16, "wrong motion"), *rows("ours", "wrong motion", 1e-12)])
-    ((_, _, lines),) = matrices(found)
-    assert [case for case, _ in lines] == ["ours", "close", "others fail", "calm"]
-    alone = [finding_of(case, case, "", "", (), {case: found.where(case=case)}) for case in ("calm", "close", "ours")]
-    absent = finding_of("absent", "absent", "", "", ())
-    assert [case.key for case in worst_first([absent, *alone])] == ["ours", "close", "calm", "absent"]
-
-
-def test_the_page_says_the_verdict_before_the_decade(cases: tuple[Finding, ...]) -> None:
+    made = [case("calm", STABLE), case("others", STABLE, "refused"), case("ours", "wrong motion")]
+    assert [one.key for one in worst_first([cases[3], *made])] == ["ours", "others", "calm", "bowl_of_low_rank"]
     page = joined(Evidence(hard_cases=cases, topics=(findings.on_hard_cases(cases),)), ())
-    assert re.search(r'✕</span> gains energy</span> <span class="decade">10[⁻\d⁰¹²³⁴-⁹]+</span>', page)
+    row = page.split(f'<a href="#case-{cases[1].key}">')[1].split("</tr>")[0]
+    assert "gram_cholesky gains energy" in row and "stable</span>" in row
