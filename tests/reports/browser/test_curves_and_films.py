@@ -53,7 +53,7 @@ def test_the_cursor_reads_the_values_of_the_run(desk: Any, evidence: Evidence) -
 
 
 def test_the_slider_shows_one_tilt_at_a_time(see: Callable[..., Any], first: Path) -> None:
-    shown = """() => [...document.querySelectorAll("#hero [data-state]")].filter((each) => each.checkVisibility())
+    shown = """() => [...document.querySelectorAll("#hero [data-state]:not([display=none])")]
         .map((each) => each.dataset.state)"""
     with see(first) as desk:
         assert desk.ask(shown) == ["1", "1"]  # the tilt of the scene, in both pictures
