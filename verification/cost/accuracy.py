@@ -417,9 +417,9 @@ def _budgets_say(table: Table) -> Part:
     gains = sum(row["largest relative gain"] > 0.0 for row in rows)
     half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
     return target(
-        "Impacts that stop early, after a budget of rows, and gain energy (computed exactly)",
-        f"{gains} of {len(rows)} combinations of size and budget. Half of the rows already take {min(half):.0f} to "
-        f"{max(half):.0f} % of the energy that all rows take", "none", gains == 0, timed=False)  # fmt: skip
+        "An impact that stops early, after a budget of rows (computed exactly)",
+        f"gains energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows already take "
+        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "no gain", gains == 0, timed=False)  # fmt: skip
 
 
 BUDGET_ROWS = Check(

@@ -97,7 +97,8 @@ def solvers_say(table: Table) -> Part:
     slower: dict[str, list[int]] = {}  # solver and family -> numbers of contacts
     for row in (row for row, more in pairs if more is False):
         slower.setdefault(f"{row['solver']} on the {row['impacts']}", []).append(row["contacts"])
-    where = ", ".join(f"{name} at {min(found)} to {max(found)} contacts" for name, found in slower.items())
+    where = ", ".join(f"{name} at {' to '.join(map(str, sorted({min(found), max(found)})))} contacts"
+                      for name, found in slower.items())
     return faster("from Python", "a solver", "pairs of solver and size", [more for _, more in pairs],
                   where and f"than {where}")
 
