@@ -419,7 +419,8 @@ def _budgets_say(table: Table) -> Part:
     return target(
         "An impact that stops early, after a budget of rows (computed exactly)",
         f"gains energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows already take "
-        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "no gain", gains == 0, timed=False)  # fmt: skip
+        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "no gain",
+        gains == 0, timed=False)  # fmt: skip
 
 
 BUDGET_ROWS = Check(
