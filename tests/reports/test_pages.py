@@ -269,6 +269,8 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     assert "agreed with complementarity has 14" in page and f"agrees to {prose('3e-04')}" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
+
+
 def told(*claims: Finding, topics: tuple[Finding, ...] = ()) -> dict[str, str]:
     """The lines of the first screen by label."""
     return {fact.label: fact.text for fact in facts(Evidence(claims=claims, topics=topics))}
