@@ -266,7 +266,7 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     topic = one("complementarity", tables={"piles": table_from(piles)})
     page = joined(Evidence(claims=(found,), topics=(topic,)))
     assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
-    assert "agreed with complementarity has 14" in page and f"agrees to {prose('3e-04')}" in page
+    assert "14 contacts are no safe limit" in page and f"agrees to {prose('3e-04')}" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
 
