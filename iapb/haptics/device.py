@@ -73,7 +73,7 @@ class SimulatedDevice:
                  force_limit: ArrayLike = np.inf, delay: int = 0, resolution: ArrayLike = 0.0) -> None:
         mass = np.array(mass_matrix, np.float64)
         self._lower = np.zeros_like(mass)
-        if cholesky(mass, self._lower) != 0:
+        if not mass.ndim or mass.shape != mass.shape[:1] * 2 or cholesky(mass, self._lower) != 0:
             raise ArgumentError("mass_matrix", mass_matrix, "a symmetric positive definite matrix (d, d)")
         size = len(mass)
         self.q, self.v, self.hand_force = np.full(size, q), np.full(size, v), np.zeros(size)

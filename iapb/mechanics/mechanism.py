@@ -179,9 +179,7 @@ class Mechanism:
 
     def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
-        places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
-        if len(places) != len(rates):
-            raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
+        places, rates = self._states(qs, vs)
         out = np.empty(rates.shape)
         if not self._entries.biases_at(self._parts, self._scratch.parts, places, rates, out):
             self._check_states(places, rates)
@@ -223,7 +221,7 @@ class Mechanism:
 
     def energies(self, qs: ArrayLike, vs: ArrayLike, g: ArrayLike) -> tuple[Floats, Floats]:
         """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for the field g (3,)."""
-        places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
+        places, rates = self._states(qs, vs)
         field, (kinetic, potential) = finite_array("g", g, (3,), "m/s^2"), np.zeros((2, len(places)))
         self._entries.energies_along(self.block, self._scratch.workspace, places, rates, field, kinetic, potential)
         return kinetic, potential
@@ -276,6 +274,13 @@ class Mechanism:
             of_unit = [first + i for i, unit in enumerate(units) if unit == "1"]
             raise ArgumentError(f"{name} of body {self.names[b]!r}", place[of_unit], "entries of total length one")
         return place
+
+    def _states(self, qs: ArrayLike, vs: ArrayLike) -> tuple[Floats, Floats]:
+        """Return as many configurations (n, nq) as velocities (n, d), or raise ArgumentError."""
+        places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
+        if len(places) != len(rates):
+            raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
+        return places, rates
 
     def _check_states(self, places: Floats, rates: Floats | tuple[()] = ()) -> None:
         for k, q in enumerate(places):

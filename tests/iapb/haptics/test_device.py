@@ -203,6 +203,12 @@ def test_a_reading_that_is_no_position_stops_the_loop(q):
         simulation.step()
 
 
+@pytest.mark.parametrize("mass", [np.eye(3)[:, :2], np.ones(3), 1.0, -MASS])
+def test_a_mass_matrix_of_another_shape_or_sign_is_refused(mass):
+    with pytest.raises(ArgumentError, match="mass_matrix"):
+        SimulatedDevice(mass, REST, dt=DT)
+
+
 def test_a_device_needs_a_coupling_and_a_tool_of_constant_inertia():
     with pytest.raises(ArgumentError, match="device = .*None, or a coupling"):
         Simulation(PEG, device=Reads(np.zeros(3)))

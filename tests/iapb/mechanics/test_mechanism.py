@@ -157,6 +157,7 @@ def test_names_units_and_layout():
     (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
     (lambda: two_link_arm().biases([[0.0, 0.0]], [[0.0, 0.0], [0.0, np.inf]]), "as many rows as qs"),
     (lambda: two_link_arm().biases([[0.0, 0.0]] * 2, [[0.0, 0.0], [0.0, np.inf]]), r"vs\[1\]"),
+    (lambda: two_link_arm().energies([[0.0, 0.0]] * 2, [[0.0, 0.0]], [0.0] * 3), "as many rows as qs"),
     (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
     (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),
     (lambda: two_link_arm().rows_along([[0.0, 0.0]], [0, 1], [[0, 0, 0]], [[1, 0, 0]]), "as many as qs"),
