@@ -31,7 +31,7 @@ from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from iapb.lazy import needed
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
-from reference.hdf5 import Budget, check_items, read_dataset
+from reference.hdf5 import Budget, check_items, read_dataset, try_file
 
 LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
 LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only
@@ -155,7 +155,9 @@ def _mlcp(path: Path) -> StoredProblem:
 
 
 def _fclib(path: Path, allowed: int | None) -> StoredProblem:
-    with needed("h5py", "FCLIB files").File(path, "r") as file:
+    library = needed("h5py", "FCLIB files")
+    try_file(path)
+    with library.File(path, "r") as file:
         check_items(file)
         budget = Budget(path, file, allowed)
         kind = "fclib_local" if "fclib_local" in file else "fclib_global"

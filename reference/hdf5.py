@@ -1,10 +1,16 @@
-"""Safety of HDF5 files from other people: checked before any data is read, and read within a budget of bytes."""
+"""Safety of HDF5 files from other people: read first by a process that may crash, and within a budget of bytes."""
 
 from __future__ import annotations
 
+import os
+import resource
+from contextlib import suppress
+from functools import lru_cache
 from math import prod
 from pathlib import Path
 from typing import Any
+
+from iapb.errors import RunFileError
 
 READ_BUDGET = 1 << 29  # bytes that one file may fill; a caller may allow more
 _PER_BYTE = 64  # a large file may fill so many bytes for each of its own; a run at rest is packed forty times
@@ -14,6 +20,55 @@ _PACKERS, _FILTERS = {1, 32000}, {1, 2, 3, 32000}  # deflate and lzf; also shuff
 _MOST_PACKED = 1100  # largest expansion factor: deflate makes at most 1032 bytes of one
 _UNPACKED_SMALL = 1 << 20  # bytes that any dataset may state
 _TEXT = 64  # bytes that Python adds to a text
+_ROWS = 1 << 20  # bytes of a piece that is read and dropped
+_SECONDS, _BYTES_PER_SECOND = 2, 1 << 20  # that reading may take of the processor: tens of times what it takes
+
+
+def try_file(path: Path) -> None:
+    """Read a file in a forked process; raise RunFileError if the HDF5 library crashes on it, or does not end.
+
+    A few wrong bytes can make the library write beyond its memory, or follow a list that has no end.
+    """
+    if path.is_file():  # else for the caller to name
+        found = path.stat()
+        if not _ends(path, found.st_ino, found.st_size, found.st_mtime_ns):
+            raise RunFileError(f"{path}: damaged or forged: the HDF5 library crashes on it, or does not end")
+
+
+@lru_cache(512)  # commands open a file several times
+def _ends(path: Path, number: int, size: int, changed: int) -> bool:
+    import h5py  # in this process, else each child would load it
+
+    child = os.fork()
+    if not child:
+        try:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            resource.setrlimit(resource.RLIMIT_CPU, (_SECONDS + size // _BYTES_PER_SECOND,) * 2)
+            with h5py.File(path) as file:
+                _read_all(file)
+        finally:
+            os._exit(0)  # what is raised, the caller meets itself
+    return not os.WIFSIGNALED(os.waitpid(child, 0)[1])
+
+
+def _read_all(file: Any) -> None:
+    """Read every attribute and every dataset, in pieces."""
+    check_items(file)
+    items = [file]
+    for item in items:
+        dict(item.attrs)
+        if hasattr(item, "values"):
+            items += item.values()
+            continue
+        with suppress(ValueError):
+            check_size(item, Budget(file.filename, file))
+            if item.dtype.hasobject or not item.shape:
+                read_dataset(item, Budget(file.filename, file))
+                continue
+            rows = max(_ROWS // max(prod(item.shape[1:]) * item.dtype.itemsize, 1), 1)
+            for first in range(0, len(item), rows):
+                item[first : first + rows]
 
 
 class Budget:

@@ -21,6 +21,7 @@ from iapb.scene import Scene
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import Simulation, simulate
 from iapb.worlds import find_world
+from reference.hdf5 import try_file
 from reports.store.folder import Place
 from reports.store.io import refuse_foreign
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
@@ -78,6 +79,7 @@ def repeat_run(path: Path | str) -> Repetition:
     ArgumentError
         The law or coupling is not one of the project's, so the file alone does not suffice to repeat the run.
     """
+    try_file(Path(path))
     stored = read_run(path)
     again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world, steps=stored.steps)
     return Repetition(content_hash(stored), content_hash(again), differences(stored, again))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from iapb.errors import ArgumentError, RunFileError
+from reference.hdf5 import try_file
 from reports.store import io
 from reports.store.folder import PARTIAL_SUFFIX
 from reports.store.io import WRITING, is_ours, looks_ours, opened
@@ -105,6 +106,7 @@ def is_run(path: Path) -> bool:
 
 def _head(path: Path) -> tuple[str, str, int]:
     """Return format, code and format version of a file."""
+    try_file(path)
     with opened(path, expected_format=None) as file:
         found = file.attrs
         return str(found.get("format", "")), str(found.get("code", "")), int(found.get("format_version", 0))

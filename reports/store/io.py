@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import IapbError, RunFileError
-from reference.hdf5 import Budget, check_items, check_size, read_dataset
+from reference.hdf5 import Budget, check_items, check_size, read_dataset, try_file
 from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
 
 MARK_NAME = "iapb-store.json"
@@ -179,6 +179,7 @@ def is_ours(path: Path) -> bool:
     with suppress(OSError, RunFileError):
         if _is_plain(path) and _ends(path)[0].startswith(PART_HEAD):
             return _seal_holds(path)
+        try_file(path)
         with opened(path, expected_format=None) as file:
             return _is_plain(path) and file.attrs.get("format") in _FORMATS
     return False
@@ -309,6 +310,8 @@ def _new_file(path: Path, replace: bool, large: bool) -> Iterator[Any]:
 def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[Any]:
     """Open a file of this project for reading; with `expected_format` None, any format is accepted.
 
+    A file outside of stores is first read in a process of its own (`reference.hdf5.try_file`).
+
     Raises
     ------
     RunFileError
@@ -322,6 +325,8 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
         raise RunFileError(f"{path}: {what}")
     try:
         _check_seal(path)
+        if not is_store(path.parent):
+            try_file(path)
         with h5py.File(path, "r", rdcc_nbytes=2 * _CHUNK_BYTES) as file:
             check_items(file)
             found = file.attrs.get("format")

@@ -285,7 +285,7 @@ def _run_in(file: Any, path: Path | str, read: Reader, budget: int | None = None
         stopped=str(file.attrs.get("stopped", "")), time=_numbers(read, file["trajectory"], TIME, place),
         contacts=ContactTable(**tables["contacts"]), impacts=ImpactTable(**tables["impacts"]),
         energy={name: _numbers(read, energy, TIME._replace(name=name), place)
-                for name in energy if not energy[name].is_scale},
+                for name in energy if "CLASS" not in energy[name].attrs},  # is_scale crashes where that is damaged,
         effects=tuple(EffectRow(name, bool(on), reason, ignored)
                       for name, on, reason, ignored in zip(*lists, strict=True)),
     )  # fmt: skip

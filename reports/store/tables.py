@@ -90,7 +90,10 @@ def read_columns(path: Path | str, name: str | None = None) -> dict[str, tuple[s
         if not tables or name not in (None, *tables):
             raise RunFileError(f"{path}: no table {name!r}: expected {one_of(str(name), tables)}")
         group, budget = group_of(file, name or tables[0], path), Budget(path, file)
-        return {key: (str(group[key].attrs["units"]), read_values(group, key, budget)) for key in group}
+        found = {key: (str(group[key].attrs["units"]), read_values(group, key, budget)) for key in group}
+        if len({len(values) for _, values in found.values()}) > 1:
+            raise RunFileError(f"{path}: the columns of the table {group.name} have different lengths")
+        return found
 
 
 def read_table(path: Path | str, name: str | None = None) -> Table:

@@ -29,10 +29,10 @@ from iapb.mechanics.urdf import read_urdf
 from reference.datasets import DatasetError, read_problem
 from reports.cli import main
 from reports.store import RunStore, read_run, write_run
-from reports.store.io import mark_store, sealed
+from reports.store.io import SEAL, mark_store, sealed
 from reports.store.parts import Parts
 from tests.robustness.faults import sample_run
-from tests.robustness.inputs import fclib_files
+from tests.robustness.inputs import fclib_files, result_files
 
 ROOT = Path(__file__).parents[2]
 MOST = 700 << 20  # bytes that a refusal may take beyond what the process had
@@ -223,6 +223,23 @@ def test_fclib_and_npz_cannot_ask_for_any_memory(tmp_path: Path) -> None:
     assert "unpacks to" in refused("certify", tmp_path / "bomb.npz")
     os.mkfifo(tmp_path / "pipe.npz")
     assert "no regular file" in refused("certify", tmp_path / "pipe.npz")
+
+
+@pytest.mark.parametrize(("before", "after"), [
+    (b"format\0\0\x19\1", b"format\0\0\x19\x78"),  # the type of a text, on which HDF5 ends with SIGSEGV
+    (b"word\0\0\0\0\x1a\0\0\0\0\0\0\0\x08\0", b"word\0\0\0\0\x1a\0\0\0\0\0\0\0\x08\4"),  # a size: a search without end
+    (b"DIMENSION_SCALE", b"DIMENSION_\xffCALE"),  # a text that is freed twice
+])  # fmt: skip
+def test_a_file_that_crashes_hdf5_or_has_no_end_stops_no_reader(before: bytes, after: bytes, tmp_path: Path) -> None:
+    mark_store(tmp_path)
+    for name, content in result_files().items():
+        (tmp_path / name).write_bytes(sealed(content[:-SEAL].replace(before, after)))
+    for words in ("store check", "store repair", "store again", "certify"):
+        assert apart(*words.split(), tmp_path)[0] in (0, 1), words
+    for words in ("inspect", "certify", "store again", "verify --recheck"):
+        assert apart(*words.split(), tmp_path / "run.h5")[0] in (0, 1), words
+    os.unlink(tmp_path / "iapb-store.json")
+    assert apart(tmp_path / "run.h5", act=read_run)[0] not in (-2, -3)
 
 
 def test_pipes_and_encodings_are_refused(tmp_path: Path) -> None:
