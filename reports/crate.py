@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from reports.pages.records import StoredFile
+from reports.store.io import write_whole
 
 CRATE_NAME = "ro-crate-metadata.json"
 PROFILE = "https://w3id.org/ro/crate/1.1"
@@ -63,7 +64,7 @@ def write_crate(out: Path, beside: Mapping[str, str], manifest: Iterable[StoredF
     ]  # fmt: skip
     path = out / CRATE_NAME
     content = {"@context": [f"{PROFILE}/context", {"sha256": "https://schema.org/sha256"}], "@graph": graph}
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_whole(path, json.dumps(content, indent=1, ensure_ascii=False))
     return path
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from iapb.errors import ArgumentError, RunFileError
 from reports.figures.figure import Figure
 from reports.pages.records import Evidence
+from reports.store.io import write_whole
 from reports.store.keys import plain
 from verification.table import Table, titled
 
@@ -86,7 +87,7 @@ def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
               for name, table in numbers.tables.items()}  # fmt: skip
     content = {"format": FORMAT, "format_version": FORMAT_VERSION, "depth": numbers.depth,
                "provenance": dict(numbers.provenance), "runs": dict(numbers.runs), "tables": tables}  # fmt: skip
-    path.write_text(json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")), encoding="utf-8")
+    write_whole(path, json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")))
     return path
 
 

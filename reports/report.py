@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -28,6 +27,7 @@ from reports.pages.builder import FIRST_PAGE
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.provenance import PEERS, collect_provenance, uncommitted_changes
+from reports.store.io import write_whole
 from reports.store.keys import evidence_version, hash_of, plain, sources_hash
 from verification.finding import Failure, attempt
 
@@ -61,11 +61,7 @@ def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
         if len(contents[name]) > largest:
             raise ArgumentError(what, f"{len(contents[name])} bytes", f"at most {largest} bytes")
     for name in sorted(contents, key=FIRST_PAGE.__eq__):
-        target = Path(folder) / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        aside = target.with_name(target.name + ".partial")
-        aside.write_bytes(contents[name])
-        os.replace(aside, target)
+        write_whole(Path(folder) / name, contents[name])
     return Path(folder) / FIRST_PAGE
 
 
@@ -93,7 +89,7 @@ def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure
     written, changed = [write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))], out / DIRTY_NAME
     changed.unlink(missing_ok=True)
     if changes := uncommitted_changes():
-        changed.write_text(changes + "\n", encoding="utf-8")
+        write_whole(changed, changes + "\n")
         written.append(changed)
     beside = {name: text for name, text in _TEXTS.items() if (out / name).is_file()}
     return (*written, write_crate(out, beside, evidence.manifest, evidence.provenance))
@@ -113,7 +109,7 @@ def report_key(out: Path, depth: str) -> str:
 def keep_answer(out: Path, key: str, facts: Mapping[str, Any], lines: Sequence[str], made_from: Iterable[str]) -> None:
     """Keep the answer of a finished report and the state of its files; paths are relative to `out`."""
     kept = {"key": key, "facts": facts, "lines": lines, "files": _states(out, (*made_from, *_TEXTS))}
-    (out / ANSWER).write_text(json.dumps(plain(kept)), encoding="utf-8")
+    write_whole(out / ANSWER, json.dumps(plain(kept)))
 
 
 def kept_answer(out: Path, key: str) -> tuple[dict[str, Any], list[str]] | None:

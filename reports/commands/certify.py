@@ -34,6 +34,8 @@ def certify(
     """Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent."""
     paths = list(dict.fromkeys(path for given in files for path in (
         sorted(filter(is_run, given.rglob("*.h5"))) if given.is_dir() else [given])))
+    if not paths:
+        raise ArgumentError("RUN", ", ".join(map(str, files)), "run files, or folders that hold some")
     found, unread = dict[Path, Certificate](), dict[Path, str]()
     if export:
         found = _exported(paths, export)

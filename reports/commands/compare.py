@@ -18,6 +18,7 @@ from reports.commands.run import Values, scene_given
 from reports.figures.figure import draw, standalone
 from reports.figures.worlds import worlds as worlds_figure
 from reports.show import Answer, Json, sentence, stage_progress, table_text
+from reports.store.io import write_whole
 from verification.check import Topic
 from verification.complementarity.solvers import collections, own_problems
 from verification.complementarity.topic import complementarity
@@ -99,12 +100,11 @@ def compare(
             drawn = draw(worlds_figure, found.tables)
         except MissingDependencyError as missing:  # the numbers are worth printing without it
             lines.append(str(missing))
-    place.parent.mkdir(parents=True, exist_ok=True)
     if drawn is not None and drawn.panels:
-        place.with_suffix(".svg").write_text(standalone(drawn), encoding="utf-8")
+        write_whole(place.with_suffix(".svg"), standalone(drawn))
         lines.append(f"Figure: {place.with_suffix('.svg')}")
     answer = Answer(_facts(found), [*lines, f"Stored in {place}"], 1 if found.failures else 0)
-    place.write_text(answer.text(json_=True), encoding="utf-8")
+    write_whole(place, answer.text(json_=True))
     return answer
 
 

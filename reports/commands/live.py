@@ -23,7 +23,7 @@ from reports.live.device import live_simulation
 from reports.live.loop import Loop
 from reports.live.replay import finish_live, open_parts
 from reports.live.viewer import Viewer
-from reports.show import Answer, Json, counted, duration
+from reports.show import Answer, Json, counted, duration, one_line
 
 LONGEST = 1e8  # ticks: at 1 kHz more than a day
 
@@ -69,7 +69,7 @@ def live(
                 to_stderr(f"What was done is in {parts.folder}; iapb store repair {out} makes it readable.")
             raise
         parts.close(remove=True)
-    lines = [*describe(pace), f"Run: {run}\nTimetable: {timetable}"]
+    lines = [*describe(pace), f"Run: {one_line(run)}", f"Timetable: {one_line(timetable)}"]
     if stopped:
         lines.append(f"Stopped: {stopped}. What was done is in the files.")
     return Answer(asdict(pace) | {"run": run, "timetable": timetable, "stopped": stopped}, lines,

@@ -28,6 +28,7 @@ from reports.pages.records import FailedCases
 from reports.report import keep_answer, kept_answer, remembering, report_key, write_companions, write_report
 from reports.runner import Runner
 from reports.show import Answer, Json, counted, stage_progress
+from reports.store.io import write_whole
 from verification.finding import Failure
 
 SHOWN_FAILURES = 20  # of a stage, in the last lines
@@ -143,13 +144,12 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
     drawn = draw(recipes[key], inputs)
     if not drawn.panels:
         raise ArgumentError("--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}")
-    out.mkdir(parents=True, exist_ok=True)
     pictures = {f"{key}-{number}.{'html' if panel.is_table else 'svg'}": (panel.svg, panel.label)
                 for number, panel in enumerate(drawn.panels)}  # fmt: skip
     whole = f"{key}.{'html' if any(panel.is_table for panel in drawn.panels) else 'svg'}"
     written = {out / name: drawing for name, drawing in {**pictures, whole: (standalone(drawn), "all of it")}.items()}
     for path, (text, _) in written.items():
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text)
     lines = [f"{path}: {label or drawn.title}" for path, (_, label) in written.items()]
     return Answer({"drawings": [out / name for name in pictures], "failed": failed}, [*lines, *_failure_lines(failed)],
                   int(bool(failed)))

@@ -20,7 +20,7 @@ from iapb.simulation import INTERRUPTED
 from iapb.system import System
 from iapb.worlds import find_world
 from reports.runner import Runner
-from reports.show import Answer, Json, counted, duration, stage_progress
+from reports.show import Answer, Json, counted, duration, one_line, stage_progress
 from reports.store.io import blocks
 from reports.store.parts import parts_of
 from reports.store.runs import opened_run
@@ -83,9 +83,9 @@ def run(
         if entry.run_key != place.key:
             raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
         file = place.path if result.complete else place.partial
-        lines = [*describe(result, existed=streamed is None), f"Stored in {file}"]
+        lines = [*describe(result, existed=streamed is None), f"Stored in {one_line(file)}"]
         if not result.complete:
-            lines[-1] = f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {file}"
+            lines[-1] = f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {one_line(file)}"
         if streamed is not None and streamed.resumed_at:
             lines.insert(0, f"Resumed after {streamed.resumed_at} steps.")
         elif streamed is not None and resume:

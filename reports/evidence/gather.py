@@ -21,7 +21,7 @@ from reports.figures.paper import arm_energies
 from reports.pages.records import Evidence, FailedCases, StoredFile
 from reports.provenance import PEERS, collect_provenance, this_machine
 from reports.runner import Runner
-from reports.store.io import opened
+from reports.store.io import opened, write_whole
 from reports.store.keys import evidence_version
 from reports.uses import UsedRun
 from verification import haptic_rate
@@ -184,7 +184,6 @@ def failed_cases(folder: Path, failures: Mapping[str, Sequence[Failure]]) -> tup
         path = folder / f"{name.replace(' ', '_')}-failed.txt"
         path.unlink(missing_ok=True)
         if lost:
-            folder.mkdir(parents=True, exist_ok=True)
-            path.write_text("\n".join(f"{one.case}\n{one.traceback}" for one in lost), encoding="utf-8")
+            write_whole(path, "\n".join(f"{one.case}\n{one.traceback}" for one in lost))
             found.append(FailedCases(name, tuple(lost), str(path)))
     return tuple(found)

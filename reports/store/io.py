@@ -8,6 +8,7 @@ opens the file. HDF5 and all software based on it ignore bytes after the end tha
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import hashlib
 import json
@@ -65,27 +66,49 @@ def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterat
     A crash at any time leaves `target` unchanged. With ``replace=False`` a target that exists at the end is kept, and
     the temporary file is removed: the first of two writers wins. A file that is not `synced` may be lost, not damaged
     unseen, by a power failure.
+
+    Raises
+    ------
+    RunFileError
+        The file cannot be written; then nothing at `target` was changed.
     """
-    aside, lock = _locked(target)
     try:
-        yield aside
-        if synced:
-            _sync(aside)
-        if replace:
-            os.replace(aside, target)
-        else:
-            try:
-                os.link(aside, target)  # fails when the target exists, unlike a rename
-            except FileExistsError:
-                return
-            except OSError:  # a file system without hard links
-                if not target.exists():
-                    os.rename(aside, target)
-        if synced:
-            _sync(target.parent)
-    finally:
-        aside.unlink(missing_ok=True)
-        os.close(lock)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists() and not target.is_file():
+            raise OSError(errno.EEXIST, "a folder, a pipe or a device is in its place")
+        aside, lock = _locked(target)
+        try:
+            yield aside
+            if synced:
+                _sync(aside)
+            if replace:
+                os.replace(aside, target)
+            else:
+                try:
+                    os.link(aside, target)  # fails when the target exists, unlike a rename
+                except FileExistsError:
+                    return
+                except OSError:  # a file system without hard links
+                    if not target.exists():
+                        os.rename(aside, target)
+            if synced:
+                _sync(target.parent)
+        finally:
+            aside.unlink(missing_ok=True)
+            os.close(lock)
+    except (OSError, RuntimeError) as error:
+        named = Path(getattr(error, "filename", None) or target)
+        if named not in target.parents and named.parent != target.parent:  # of another file, read meanwhile
+            raise
+        number = re.search(r"errno = (\d+)", str(error))  # the HDF5 library includes the number in its message
+        why = getattr(error, "strerror", None) or (os.strerror(int(number[1])) if number else error)
+        raise RunFileError(f"{target}: cannot be written: {why}; the previous file is unchanged") from error
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file atomically, and not synced; it raises the error of `written_aside`."""
+    with written_aside(path.resolve(), replace=True, synced=False) as aside:
+        aside.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def _locked(target: Path) -> tuple[Path, int]:
@@ -137,7 +160,6 @@ def refuse_foreign(path: Path) -> None:
 
 def mark_store(folder: Path) -> None:
     """Create a folder if necessary, and mark it as a store; files are only ever removed from marked stores."""
-    folder.mkdir(parents=True, exist_ok=True)
     if not is_store(folder):
         with written_aside(folder / MARK_NAME, replace=False) as aside:
             aside.write_text(json.dumps(_STORE) + "\n", encoding="utf-8")
@@ -289,21 +311,15 @@ def _new_file(path: Path, replace: bool, large: bool) -> Iterator[Any]:
             yield file
             file.flush()
             image = file.id.get_file_image()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with written_aside(path, replace=replace) as aside:
-            if not large:
-                aside.write_bytes(sealed(image))
-                return
-            with h5py.File(aside, "w", rdcc_nbytes=2 * _CHUNK_BYTES, locking=False) as file:
-                yield file
-            mark = _MARK + _checksum(aside, aside.stat().st_size).encode() + b"\n"
-            with aside.open("ab") as end:
-                end.write(mark)
-    except (OSError, RuntimeError) as error:
-        number = re.search(r"errno = (\d+)", str(error))  # the HDF5 library includes the number in its message
-        why = getattr(error, "strerror", None) or (os.strerror(int(number[1])) if number else error)
-        raise RunFileError(f"{path}: cannot be written: {why}; the previous file is unchanged") from error
+    with written_aside(path, replace=replace) as aside:
+        if not large:
+            aside.write_bytes(sealed(image))
+            return
+        with h5py.File(aside, "w", rdcc_nbytes=2 * _CHUNK_BYTES, locking=False) as file:
+            yield file
+        mark = _MARK + _checksum(aside, aside.stat().st_size).encode() + b"\n"
+        with aside.open("ab") as end:
+            end.write(mark)
 
 
 @contextmanager

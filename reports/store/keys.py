@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from iapb.scene import scene_folder
-from reports.store.io import blocks, written_aside
+from reports.store.io import blocks, write_whole
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
 # Sources that can change a number in a run: the engine, the reference worlds, and the numeric packages.
@@ -97,10 +97,8 @@ def sources_hash(folder: str) -> str:
         known = dict(json.loads(kept.read_text(encoding="utf-8")))
     codes = {names[name]: known.get(names[name]) or code_hash(source) for name, source in files.items()}
     if codes != known:
-        with suppress(OSError):  # the folder may be read-only
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            with written_aside(kept, replace=True) as aside:
-                aside.write_text(json.dumps(codes), encoding="utf-8")
+        with suppress(RunFileError):  # the folder may be read-only
+            write_whole(kept, json.dumps(codes))
     return hash_of({name: codes[digest] for name, digest in names.items()})
 
 

@@ -115,9 +115,8 @@ class Parts:
         try:  # a file in its place is of somebody else, or the same part, written before Ctrl-C
             with written_aside(path, replace=False, synced=self._synced) as aside:
                 aside.write_bytes(sealed(b"".join([line, b"\n", *(array.tobytes() for array in arrays.values())])))
-        except OSError as error:
-            raise RunFileError(f"{path}: cannot be written: {error.strerror or error}; --resume goes on from the last "
-                               "part before it") from error
+        except RunFileError as error:
+            raise RunFileError(f"{error}; --resume goes on from the last part before it") from error
         self._count, self.steps = self._count + 1, self.steps + steps  # together: Ctrl-C does not come between them
 
     def close(self, *, remove: bool = False) -> None:

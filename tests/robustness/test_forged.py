@@ -24,12 +24,12 @@ import numpy as np
 import pytest
 
 from iapb import certify_impacts, load_scene
-from iapb.errors import ArgumentError, IapbError
+from iapb.errors import ArgumentError, IapbError, RunFileError
 from iapb.mechanics.urdf import read_urdf
 from reference.datasets import DatasetError, read_problem
 from reports.cli import main
 from reports.store import RunStore, read_run, write_run
-from reports.store.io import SEAL, mark_store, sealed
+from reports.store.io import SEAL, mark_store, sealed, write_whole
 from reports.store.parts import Parts
 from tests.robustness.faults import sample_run
 from tests.robustness.inputs import fclib_files, result_files
@@ -351,6 +351,31 @@ def test_streams_that_end_or_are_full_blame_no_file(line: str, status: str, said
     done = shell(line, tmp_path)
     assert done.stdout.strip() == status and "run.h5" not in done.stderr and "Traceback" not in done.stderr, done
     assert done.stderr == said or (said == "0" and int(done.stderr) > 1000), done
+
+
+def test_names_stay_on_one_line_and_a_folder_without_runs_is_not_certified(tmp_path: Path) -> None:
+    assert "expected run files, or folders that hold some" in refused("certify", tmp_path)
+    said = refused("run", "peg_corner", "--set", "duration=0.4", "--out", tmp_path / "a\nname", status=0)
+    assert "a\\nname" in said and "\nname" not in said.replace("a\\nname", "")
+
+
+def limited(act: Callable[..., Any], *words: Any) -> Any:
+    """Do something where no file may have more than 50 bytes."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50, 50))
+    return act(*words)
+
+
+def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    run, place = write_run(tmp_path / "run.h5", sample_run()), tmp_path / "new" / "file"
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RunFileError, match="pipe: cannot be written: .* in its place"):
+        write_whole(tmp_path / "pipe", "text")
+    assert command("certify", run, "--export", tmp_path / "enough") == 0
+    for act, words in ((command, ("certify", run, "--export", place)), (write_whole, (place, "text" * 50)),
+                       (mark_store, (place.parent,)), (write_run, (place, sample_run()))):
+        said = refused(act, *words, act=limited)
+        assert f"{place.parent}/" in said and "cannot be written: File too large" in said, said
+        assert list(place.parent.iterdir()) == []
 
 
 def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path: Path) -> None:
