@@ -51,6 +51,17 @@ def test_delay_shifts_forces_and_readings_by_its_steps(forces, delay):
     assert late.read().q == pytest.approx(history[max(len(history) - 1 - delay, 0)], abs=0.0)
 
 
+@given(forces)
+def test_actuators_clip_and_the_hand_does_not(forces):
+    limit = np.array([15.0, 15.0, 1.0])
+    device, clipped = SimulatedDevice(MASS, REST, dt=DT, force_limit=limit), SimulatedDevice(MASS, REST, dt=DT)
+    device.hand_force = clipped.hand_force = np.array([50.0, 0.0, 0.0])
+    for force in forces:
+        device.apply(force)
+        clipped.apply(np.clip(force, -limit, limit))
+    assert np.array_equal(device.q, clipped.q)
+
+
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.floats(1e-6, 1e-2))
 def test_a_reading_is_a_multiple_of_the_resolution_and_half_a_step_off_at_most(start, step):
     device = SimulatedDevice(MASS, start, [0.3, -0.2, 0.1], dt=DT, resolution=[step, step, 0.0])
