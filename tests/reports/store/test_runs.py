@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import platform
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,8 @@ from hypothesis import strategies as st
 
 from iapb.errors import RunFileError
 from iapb.run import Run
-from reports.store import content_hash, read_run, write_run
+from reports.provenance import collect_provenance
+from reports.store import content_hash, read_provenance, read_run, write_run
 from reports.store.io import sealed
 from reports.store.schema import FORMAT_VERSION
 
@@ -155,6 +157,16 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "other.h5").write_bytes(sealed((tmp_path / "other.h5").read_bytes()))
     with pytest.raises(RunFileError, match="expected 'iapb run'"):
         read_run(tmp_path / "other.h5")
+
+
+def test_provenance_is_complete_and_names_no_machine(tmp_path: Path, make_run: MakeRun) -> None:
+    facts = collect_provenance(seeds=(3, 4))
+    assert read_provenance(write_run(tmp_path / "run.h5", make_run(), provenance=facts)) == facts
+    for name in ("version", "commit", "dirty", "lock", "cpu", "blas", "numba", "seeds", "command"):
+        assert facts[name]
+    text = " ".join(facts.values())
+    assert str(Path(__file__).parents[3]) not in text and str(Path.home()) not in text
+    assert platform.node() == "" or platform.node() not in text.split()
 
 
 @pytest.mark.parametrize("wrong", [
