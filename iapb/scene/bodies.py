@@ -19,6 +19,8 @@ from pydantic import (
     TypeAdapter,
     ValidationError,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     field_validator,
     model_validator,
 )
@@ -35,6 +37,7 @@ from iapb.scene.parts import (
     ScenePart,
     Vector2,
     Vector3,
+    expectation,
     require,
 )
 
@@ -179,7 +182,18 @@ JointDamping = Annotated[
     tuple[NonNegative, ...], BeforeValidator(lambda given: (given,) if isinstance(given, int | float) else given,
                                              json_schema_input_type=NonNegative | tuple[NonNegative, ...]),
     Field(description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none")]
-Inertia = Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tuple[Vector3, Vector3, Vector3]
+
+
+def _in_one_form(given: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+    """Refuse what has no form of an inertia once, not once for each form."""
+    try:
+        return validate(given)
+    except ValidationError:
+        raise expectation("three finite numbers xx, yy, zz; six with xy, xz, yz; or a matrix of three rows") from None
+
+
+Inertia = Annotated[Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tuple[Vector3, Vector3, Vector3],
+                    WrapValidator(_in_one_form)]
 
 
 class AnyBody(ScenePart):

@@ -22,6 +22,7 @@ from iapb.scene.bodies import INERTIAL, ORIGIN, WORLD, Body, SpatialBody, Spatia
 from iapb.scene.document import Document, yaml_text
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
+    MISSING,
     Fraction,
     Gain,
     Name,
@@ -258,7 +259,9 @@ class Scene(ScenePart):
 
     @classmethod
     def across_fields(cls, given: Any) -> Iterable[tuple[Path, Any, str]]:
-        return _across_parts(given)
+        if cls is Scene and any(body.get("joint") == "free_flyer" for body in _mappings(given, "bodies")):
+            yield ("dimensions",), MISSING, "3 for a scene in space: free_flyer is a joint there"
+        yield from _across_parts(given)
 
     @property
     def step(self) -> float:
