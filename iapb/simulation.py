@@ -255,14 +255,15 @@ class Simulation:
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
              world: str = "", steps: int | None = None,
              progress: Callable[[int, int], None] | None = None, max_memory: float | None = None) -> Run:
-    """Simulate a scene, either with a contact law and a coupling or in a named world, and return the run.
+    """Simulate a scene in a named world, or with a contact law and a coupling, and return the run.
 
     Parameters
     ----------
     scene : Scene, the path of a scene file, or the name of a scene of the project.
-    law, coupling : see `Simulation`.
+    law, coupling : see `Simulation`; without both, those of the world.
     world : ``"IAPB"``, ``"PB"`` or another name of `iapb.worlds`, which selects the law, and the coupling with the
-        scene's gains. If `law` is given, it is only a name for the record; default: the names of law and coupling.
+        scene's gains; default: IAPB, as in `iapb run`. If `law` is given, it is only a name for the record; default
+        then: the names of law and coupling.
     steps : number of steps, at least 1; default: the scene's duration times its rate.
     progress : called as progress(steps done, total steps) after every chunk.
     max_memory : largest size of the record [bytes]; ``math.inf`` for no limit; default: half of the machine's memory.
@@ -291,7 +292,8 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
             raise ArgumentError(name, value, expected)
     if not isinstance(scene, Scene):
         scene = _scene_at(find_scene(scene))
-    if world and law is None:
+    if law is None and (world or coupling is None):
+        world = world or "IAPB"
         chosen = find_world(world)
         law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
     simulation = Simulation(system_of(scene), law, coupling)

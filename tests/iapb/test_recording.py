@@ -61,7 +61,8 @@ def test_a_run_has_the_same_bits_whatever_its_chunks_and_records(monkeypatch, by
 
 def test_parts_of_a_run_continue_each_other():
     scene = load_scene(find_scene("peg_corner"))
-    whole, recorder = simulate(scene, steps=1400), Recorder(Simulation(scene))
+    coupling = coupling_of(scene, "four-channel")
+    whole, recorder = simulate(scene, coupling=coupling, steps=1400), Recorder(Simulation(scene, coupling=coupling))
     parts = []
     while recorder.steps < 1400:
         assert recorder.chunk(1400) is None

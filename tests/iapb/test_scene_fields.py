@@ -91,7 +91,7 @@ def test_a_table_is_linear_between_its_rows_and_constant_outside() -> None:
 
 def test_the_record_has_the_force_of_each_steps_start_and_steps_alone_give_the_same_bits() -> None:
     scene = pushed(**{"hand.force_table": TABLE, "hand.force_function": ["0.1*sin(2*pi*t)", 0, "step(t - 0.5)/100"]})
-    run, alone = simulate(scene), Simulation(scene)
+    run, alone = simulate(scene, ImpulseAugmented()), Simulation(scene)
     expected = np.array(scene.hand.forces(run.time[:-1]))
     assert np.array_equal(run.hand_force, expected)  # the peg's coordinates are the hand's axes; three chunks
     states = np.array([alone.step().q for _ in range(700)])

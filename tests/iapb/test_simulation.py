@@ -142,6 +142,7 @@ def test_a_scene_has_a_name_and_a_world_selects_the_law_and_its_coupling():
     run = simulate("peg_corner", world="PB", steps=3)
     assert (run.world, run.law, run.coupling) == ("PB", "penalty", "four-channel")
     assert simulate(PEG, Penalty(), world="my own", steps=3).world == "my own"
+    assert_same(simulate(PEG, steps=STEPS), simulate(PEG, world="IAPB", steps=STEPS))  # its gains act, as in `iapb run`
     assert simulate(PEG, world="PB", coupling=NoCoupling(), steps=3).coupling == "none"
     assert simulate(load_scene(find_scene("two_discs")), world="IAPB-push", steps=3).coupling == "none"
     with pytest.raises(ArgumentError, match=r"world = 'nonsense': expected one of IAPB, PB"):

@@ -238,7 +238,7 @@ def test_mass_matrix_that_is_made_again_must_be_the_recorded_one(cradle: Run) ->
 def test_digest_is_of_m_made_again_which_in_the_engine_has_the_bits_of_the_step() -> None:
     """On a moving arm the M inside the step of each impact, hashed there, has the digest recorded after the run."""
     scene = load_scene(find_scene("three_link_arm_elastic"))
-    run, simulation, inside = simulate(scene, steps=1000), iapb.Simulation(scene), []
+    run, simulation, inside = simulate(scene, ImpulseAugmented(), steps=1000), iapb.Simulation(scene), []
     for step in range(run.steps):
         simulation.step()
         if step in run.impacts.step:
