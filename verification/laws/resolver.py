@@ -147,7 +147,8 @@ def least_push(rows: Floats, target: Floats) -> Floats:
                 tried[:] = False
                 break
             leaving = used & (best <= 0.0)
-            share = np.min(p[leaving] / (p[leaving] - best[leaving]), initial=1.0, where=p[leaving] > best[leaving])
+            stops = leaving & (p > best)
+            share = np.min(p[stops] / (p[stops] - best[stops]), initial=1.0)
             p += share * (best - p)
             used &= ~(leaving & (p <= ROUNDING * np.max(p, initial=0.0)))
             p[~used] = 0.0

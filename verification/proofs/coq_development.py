@@ -56,24 +56,30 @@ class Theorem:
 def theorems(progress: Callable[[int, int], None] = lambda *_: None,
              failures: list[Failure] | None = None) -> tuple[Theorem, ...]:  # fmt: skip
     """Return every theorem about the code, with Coq's answer, or "not run here" if Coq is not installed."""
-    files = sorted(path.stem for path in FOLDER.glob("*.v") if path.stem != STATEMENTS)
-    return tuple(of_each(counted(files, progress), _answered, failures))
+    with TemporaryDirectory() as folder:
+        about_code = [name for name in files() if name != STATEMENTS]
+        return tuple(of_each(counted(about_code, progress), lambda name: _answered(name, Path(folder)), failures))
+
+
+def files() -> list[str]:
+    """Return the names of the files, each after those that it requires."""
+    return sorted((path.stem for path in FOLDER.glob("*.v")), key=lambda name: (len(_required(name)), name))
 
 
 @cache
 def statements() -> dict[str, Theorem]:
     """Return the statements that Coq proves too, by name, with its answer."""
-    return {theorem.name: theorem for theorem in _answered(STATEMENTS)}
+    with TemporaryDirectory() as folder:
+        return {theorem.name: theorem for theorem in _answered(STATEMENTS, Path(folder))}
 
 
-def _answered(name: str) -> tuple[Theorem, ...]:
+def _answered(name: str, folder: Path) -> tuple[Theorem, ...]:
     if lacking(name):
         return tuple(Theorem(one, NOT_RUN, says=said) for one, said in _asked(name).items())
-    with TemporaryDirectory() as folder:
-        try:
-            return compiled(name, Path(folder))
-        except IapbError as error:  # may be due to another version of Coq or Flocq, so it refutes nothing
-            return tuple(Theorem(one, NO_ANSWER, (), str(error), said) for one, said in _asked(name).items())
+    try:
+        return compiled(name, folder)
+    except IapbError as error:  # may be due to another version of Coq or Flocq, so it refutes nothing
+        return tuple(Theorem(one, NO_ANSWER, (), str(error), said) for one, said in _asked(name).items())
 
 
 def version() -> str:
@@ -102,7 +108,7 @@ def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
     """
     if reason := lacking(name):
         raise MissingDependencyError(reason.partition(" ")[0], "the Coq development", _HINT)
-    for needed in re.findall(r"^Require Import (\w+)\.$", _source(name), re.MULTILINE):
+    for needed in _required(name):
         if not (folder / f"{needed}.vo").exists():
             compiled(needed, folder)
     shutil.copy(FOLDER / f"{name}.v", folder)
@@ -115,6 +121,10 @@ def compiled(name: str, folder: Path) -> tuple[Theorem, ...]:
 
 def _source(name: str) -> str:
     return (FOLDER / f"{name}.v").read_text(encoding="utf-8")
+
+
+def _required(name: str) -> list[str]:
+    return re.findall(r"^Require Import (\w+)\.$", _source(name), re.MULTILINE)
 
 
 def _asked(name: str) -> dict[str, str]:

@@ -20,6 +20,7 @@ from verification.proofs.coq_development import (
     STATEMENTS,
     Theorem,
     compiled,
+    files,
     lacking,
     theorems,
 )
@@ -97,13 +98,18 @@ def test_exported_integers_are_the_doubles() -> None:
     assert size == 2 and values == [*mass.ravel(), *v.ravel(), *w.ravel()]
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.v")))
-def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("built")
+
+
+@pytest.mark.parametrize("name", files())
+def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, built: Path) -> None:
     source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
     assert not any(word in source for word in ("Admitted", "admit.", "Axiom ", "Parameter ", "Abort"))
     if reason := lacking(name):
         pytest.skip(reason)
-    found = compiled(name, tmp_path)
+    found = compiled(name, built)
     assert found and all(theorem.holds for theorem in found), found
     if name == STATEMENTS:
         assert {theorem.name for theorem in found} < set(all_proofs())
