@@ -17,7 +17,7 @@ from reference.simulators.simulator import Settings, Simulator
 from reference.simulators.trajectory import Samples, Trajectory, steps_between_samples
 
 STEP = 1e-3  # [s] Pinocchio has no default step
-DAMPING, DAMPING_OF_A_STACK = 1e-12, 1e-8  # [1/kg] the best of 0, 1e-14, 1e-12, 1e-10, 1e-8 and 1e-6 on these scenes
+DAMPING, DAMPING_OF_A_STACK = 1e-14, 1e-8  # [1/kg] the best of 0, 1e-14, 1e-12, 1e-10, 1e-8 and 1e-6 on these scenes
 MANY_TIMES_HEAVIER = 1e3  # mass ratio from which the larger damping is needed
 APPROACHES = 1e-12  # [m/s] a slower approach is rounding error of a contact at rest
 

@@ -13,7 +13,7 @@ from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed
 from reference.simulators.simulator import damping_for, spring_restitution, viscous_dissipation_for
 from reference.simulators.trajectory import Trajectory, deepest_overlap
 
-ROUNDING = 1e-10  # of some hundred steps, and the 1e-12 by which Pinocchio's Delassus matrix is damped
+ROUNDING = 1e-10  # of some hundred steps, and the 1e-14 by which Pinocchio's Delassus matrix is damped
 
 
 def engine(name):
