@@ -17,7 +17,7 @@ function plotOf(svg) {
 // Height of a curve at x, straight between its points; undefined beyond its ends.
 function heightAt(points, x) {
   const after = points.findIndex((point) => point[0] >= x);
-  if (after < 0 || (after === 0 && points[0][0] > x)) return undefined;
+  if (after < 0 || (after === 0 && points[0][0] > x)) return;
   const [[xa, ya], [xb, yb]] = [points[Math.max(after - 1, 0)], points[after]];
   return xb > xa ? ya + ((x - xa) / (xb - xa)) * (yb - ya) : yb;
 }
@@ -33,8 +33,7 @@ function read({ svg, frame: [left, top, right, bottom], x, y, curves, readout, l
     add(add(readout, "p", { textContent: label }), "b", { textContent: value });
   }
   readout.style.cssText = share > 0.5 ? `left:${(100 * left) / width + 1}%` : `right:${100 - (100 * right) / width}%`;
-  const above = 100 * (1 - svg.clientHeight / svg.parentElement.clientHeight);
-  const down = (at) => above + ((100 - above) * at) / height;
+  const above = 100 * (1 - svg.clientHeight / svg.parentElement.clientHeight), down = (at) => above + ((100 - above) * at) / height;
   line.style.cssText = `left:${(100 * place) / width}%;top:${down(top)}%;bottom:${100 - down(bottom)}%`;
   readout.hidden = line.hidden = false;
 }
@@ -71,8 +70,8 @@ document.querySelectorAll("figure").forEach((figure) => {
 // The films of a figure share one slider; without this script they play by themselves, again and again.
 function play(films, controls) {
   const [end, slower, start] = ["duration", "slower", "start"].map((name) => +films[0].dataset[name]);
-  const button = add(controls, "button", { type: "button" });
-  const slider = add(controls, "input", { type: "range", min: 0, max: end, step: end / 1000, ariaLabel: "Time" });
+  const button = add(controls, "button", { type: "button" }), slider = add(controls, "input",
+    { type: "range", min: 0, max: end, step: end / 1000, ariaLabel: "Time" });
   const clock = add(controls, "output", {});
   const tell = (time) => { slider.value = time; clock.textContent = `${time.toFixed(3)} s, 1 : ${slower}`; };
   const pause = () => { films.forEach((film) => film.pauseAnimations()); button.textContent = "▶ Play"; };
@@ -85,8 +84,7 @@ function play(films, controls) {
   button.addEventListener("click", () => {
     if (!films[0].animationsPaused()) return pause();
     if (+slider.value >= end) seek(start);
-    films.forEach((film) => film.unpauseAnimations());
-    button.textContent = "❚❚ Pause";
+    films.forEach((film) => film.unpauseAnimations()), button.textContent = "❚❚ Pause";
     requestAnimationFrame(follow);
   });
   slider.addEventListener("input", () => { pause(); seek(+slider.value); });
