@@ -204,11 +204,11 @@ def test_a_budget_can_be_raised_and_lowered(tmp_path: Path) -> None:
 
 
 def test_fclib_and_npz_cannot_ask_for_any_memory(tmp_path: Path) -> None:
-    for name, size in (("a.hdf5", 1_000_000), ("b.hdf5", 60_000)):
+    for name, size, kind in (("a.hdf5", 4000, "S1000000"), ("b.hdf5", 10**8, "f8")):
         (tmp_path / name).write_bytes(fclib_files()["local.hdf5"])
         with h5py.File(tmp_path / name, "r+") as file:
-            del file["fclib_local/info/title"]
-            file.create_dataset("fclib_local/info/title", (4000,), f"S{size}")
+            del file["fclib_local/vectors/q"]
+            file.create_dataset("fclib_local/vectors/q", (size,), kind)
     with h5py.File(tmp_path / "deep.hdf5", "w") as file:
         deep(file)
     for name in ("a.hdf5", "b.hdf5", "deep.hdf5"):
