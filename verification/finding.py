@@ -248,10 +248,10 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
     counts = [sum(count or 0 for count in judged.column(column.key)) for column in trials.columns if column.cases]
     cases = max(decided, *counts, 0)
     if decided < LEAST_DECIDED <= cases:
-        part, said = replace(part, cases=cases), f"{said}, which stand for {cases} cases"
+        part, said = replace(part, cases=cases), f"{said} ({cases} cases in all)"
     elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE:
         part = replace(part, verdict=NOT_TESTABLE if part.verdict == REPRODUCED else part.verdict)
-        said = f"{said}; fewer than {LEAST_DECIDED} decide"
+        said = f"{said}; fewer than {LEAST_DECIDED} trials can tell"
     return replace(part, sentence=f"{said}.")
 
 
@@ -262,7 +262,7 @@ def _where_it_fails(trials: Table) -> str:
         return ""
     if len(failed.rows) == decided:
         return f"in all {decided} trials"
-    return f"in {len(failed.rows)} of {decided} trials, with {ranges(failed).replace('; ', ', ')}"
+    return f"in {len(failed.rows)} of {decided} trials, under these conditions: {ranges(failed)}"
 
 
 def verdict_of(parts: Iterable[Part]) -> str:

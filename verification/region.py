@@ -76,16 +76,16 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
         contradicted = f"{region} fails in {_failing(inside)} other trials" if region else ""
         region, inside = (search_region(trials), trials.only(())) if fresh else (None, inside)
         if region is None:
-            return None, f"no region confirmed: {contradicted}" if contradicted else "no region found"
+            return None, f"no range of conditions is confirmed: {contradicted}" if contradicted else "no range is found"
     drawn = fresh(region) if fresh else inside.only(())
     if False in drawn.holds:
-        return None, f"no region confirmed: {region} fails in {_failing(drawn)} fresh trials"
+        return None, f"no range of conditions is confirmed: {region} fails in {_failing(drawn)} fresh trials"
     region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
-    counts = (f"{region.searched} trials that found this region, {region.others} others and {region.fresh} fresh ones "
-              "hold")  # fmt: skip
+    counts = (f"{region.searched} trials that led to this range, {region.others} other trials and {region.fresh} fresh "
+              "trials hold")  # fmt: skip
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
-        return None, f"no region confirmed: for {region} only {counts}"
-    return region, f"where {region} ({region.share:.0%} of the tested range) all {counts}"
+        return None, f"no range of conditions is confirmed: where {region}, only {counts}"
+    return region, f"where {region} ({region.share:.0%} of the tested range), all {counts}"
 
 
 def _failing(trials: Table) -> str:

@@ -138,8 +138,8 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
     caption = (
         "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: with impulses (IAPB) the "
         "hand's path is nearest to the path at a rigid wall (ideal). A cross: springs only (PB) or a rigid wall felt "
-        "through a spring (CBuc) is nearer. A ring: they differ by less than the error of ideal. "
-        f"IAPB is closest in {', '.join(counts)} (together: in the kinetic metric)."
+        "through a spring (CBuc) is nearer. A ring: too close to tell, because the distances differ by less than the "
+        f"error of the ideal path. IAPB is closest in {', '.join(counts)}."
     )
     return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
                          "part", ranked=True, words=NAMED)
@@ -184,8 +184,8 @@ def counted(part: Part) -> str:
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
     cases = f" on {part.cases} cases" if part.cases else ""
     region = part.region
-    where = (f"; the region is {region.share:.0%} of the tested range, found with {region.searched} trials, confirmed "
-             f"by {region.others + region.fresh} others") if region else ""  # fmt: skip
+    where = (f" over all conditions; the stated range is {region.share:.0%} of them, found with {region.searched} "
+             f"trials and confirmed by {region.others + region.fresh} others") if region else ""  # fmt: skip
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 

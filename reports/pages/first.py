@@ -18,13 +18,13 @@ from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
     "The energy loss in (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. Impulses by (13) "
-    "and (14) do not conserve momentum. The printed formula can gain energy by rounding."
+    "and (14) do not conserve momentum. Formula (21), computed as printed, can gain energy by rounding."
 )
-LIMIT = "Springs and time stepping can still add energy: see known failures."
+LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
 COUNTED = dict(zip(KINDS, (
-    "hold{s}", "hold{s}, with a misprint in the printed formula", "hold{s} in a stated range of conditions",
-    "hold{s} in part and fail{s} in a named quantity", "fail{s}", "cannot be decided here", "not computed",
+    "hold{s}", "hold{s} once a misprint in the formula is corrected", "hold{s} in a stated range of conditions",
+    "hold{s} for some quantities and fail{s} for others", "fail{s}", "cannot be decided here", "not computed",
 ), strict=True))
 # Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
 GRAVEST = ("exact-energy", "hard-cases", "scene-ledger", "engines", "complementarity", "stability", "mechanics")
@@ -61,7 +61,8 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     found = [*_forces(claims.get("C11")), *_path(claims.get("C10"))]
     counts = [f"{count} {words}" for count, words in count_claims(evidence.claims).values()]
     trials = sum(part.decided + part.unknown for claim in evidence.claims for part in claim.parts)
-    told = [Fact("Tested", f"{len(claims)} claims of the paper, in {trials:,} trials: {'; '.join(counts)}.", "claims")
+    told = [Fact("Tested", f"{len(claims)} claims of the paper, each under many conditions ({trials:,} trials): "
+                 f"{'; '.join(counts)}.", "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
         if text := " ".join(said for held, said in found if held is wanted):
@@ -101,17 +102,18 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     parts = {part.name: part for part in claim.parts if not part.role} if claim else {}
     if claim is None or (whole := parts.pop(ALL_THREE, None)) is None:
         return
-    each = ", ".join(f"{part.held} of {part.decided} in {part.named or name}" for name, part in parts.items())
+    each = ", ".join(f"{part.named or name} in {part.held} of {part.decided}" for name, part in parts.items())
     yield whole.verdict in (REPRODUCED, WHERE), (
-        "With impulses the hand's path is nearer to the path at a rigid wall than with springs alone, and than with "
-        f"a rigid wall felt through a spring, in {whole.held} of the {whole.decided} starts that can tell"
-        f"{f', and always where {whole.region}' if whole.region else ''} ({each}).")
+        "Over all starts, impulses bring the hand's path (position and rotation together) nearest to the path at a "
+        f"rigid wall in {whole.held} of {whole.decided} "
+        f"starts{f', always where {whole.region}' if whole.region else ''}. Each coordinate on its own: {each}. Starts "
+        "that are too close to call are not counted.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)):
         found = {name: closest_at(table, small)[name] for name in ("x", "y")}
-        each = " and ".join(f"{ahead} of {told} in {name}" for name, (ahead, told) in found.items())
+        each = " and ".join(f"{name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the peg starts tilted by at most {degrees(Condition().tilt):.2f}°, the hand's path is nearest to the "
-            f"path at a rigid wall with impulses: in {each} of the starts that can tell.")
+            f"If the pushed body, a peg, starts tilted by at most {degrees(Condition().tilt):.2f}°, impulses bring the "
+            f"hand's path nearer to the path at a rigid wall than both rivals do: {each} starts.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -120,9 +122,10 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
         yield f"One step of the corner scene takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
         least, most = (f"{end(races['ratio']):.2g}" for end in (min, max))
-        yield f"A step at rest takes {least} to {most} times as long as in the engine MuJoCo."
+        yield f"With all bodies at rest, a step takes {least} to {most} times as long as one of the engine MuJoCo."
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
-        yield f"Lemke's complementarity method is faster in {raced.holds.count(False)} of {len(raced.decided)} impacts."
+        yield (f"Lemke's complementarity method is faster than our impact in {raced.holds.count(False)} of the "
+               f"{len(raced.decided)} tested impacts whose times differ clearly.")
 
 
 def _misses(topics: tuple[Finding, ...]) -> Fact:
@@ -130,7 +133,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lines = []
     for topic in sorted(topics, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
         if clauses := [part.miss for part in topic.parts if part.miss]:
-            more = f", and {len(clauses) - 1} more" if len(clauses) > 1 else ""
+            more = f" (further failures on that page: {len(clauses) - 1})" if len(clauses) > 1 else ""
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."

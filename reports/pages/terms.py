@@ -14,11 +14,10 @@ from reports.pages.formulas import prose
 
 # A pattern for the words that name the term -> the term as listed, and its meaning.
 TERMS: dict[str, tuple[str, str]] = {
-    r"worlds?": ("world", "one choice of contact law and of coupling between device and tool; the same scene is "
-                 "simulated in several worlds, listed here by name"),
+    r"worlds?": ("world", "a contact law together with a coupling between device and tool. The same scene is "
+                 "simulated in several worlds, each with its name"),
     r"IAPB": ("IAPB", "impulse-augmented penalties, the paper's method: an impulse at each new contact, then a spring "
-              "and damper while the contact lasts. It is also the name of the world with this contact law and the "
-              "four-channel coupling"),
+              "and damper while the contact lasts. The world IAPB has this contact law and the four-channel coupling"),
     r"ideal|rigid world": ("ideal", "the world with rigid contacts, computed from a complementarity problem in every "
                            "step, and the four-channel coupling; the reference for a wall that feels rigid"),
     r"PB": ("PB", "penalty-based: the world with springs and dampers as contacts, no impulses, and the four-channel "
@@ -41,20 +40,20 @@ TERMS: dict[str, tuple[str, str]] = {
                                      "stiffness and damping"),
     r"coordinates": ("coordinates", "the generalized coordinates of a scene; their number d is the size of the mass "
                      "matrix M"),
-    r"rows?": ("row", "one line of the contact Jacobian J: the velocity at one contact along its normal is this row "
-               "times the generalized velocity v"),
-    r"redundant": ("redundant", "a row (or its contact) that is a linear combination of the other rows of the impact; "
-                   "the impulses are then not unique, the velocity is"),
+    r"rows?": ("row", "one line of the contact Jacobian J. The row times the generalized velocity v is the velocity at "
+               "one contact along its normal"),
+    r"redundant": ("redundant", "a row (or its contact) that is a linear combination of the other rows of the impact. "
+                   "Redundant rows make the impulses ambiguous, but not the velocity after the impact"),
     r"rank": ("rank", "the number of linearly independent rows"),
-    r"patch": ("patch", "contacts that all lie on one face of one body, so that at most three are independent"),
-    r"piles?": ("pile", "many bodies that lie on each other, so that most contacts are independent"),
-    r"restitution|e = [0-9.]+": ("restitution e", "the ratio of separating to approaching speed at a contact, "
-                                 "v_n⁺ = −e v_n⁻; this equation is the restitution law, and the restitution residual "
-                                 "is its largest error"),
+    r"patch": ("patch", "contacts on one face of one body; at most three of their rows are independent"),
+    r"piles?": ("pile", "many bodies that lie on each other; most of their contact rows are independent"),
+    r"restitution|e = [0-9.]+": ("restitution e", "the ratio of separating to approaching speed at a contact. The "
+                                 "equation v_n⁺ = −e v_n⁻ is the restitution law; the restitution residual is the "
+                                 "largest error in this equation"),
     r"kinetic metric": ("kinetic metric", "the length √(vᵀ M v) of a velocity v; half of its square is the kinetic "
                         "energy"),
-    r"[vu]⁻|[vu]⁺|KE[⁻⁺]|γ[⁻⁺]": ("superscripts − and +", "before and after an impact: v velocity, KE kinetic energy, "
-                                  "γ normal velocities at the contacts"),
+    r"[vu]⁻|[vu]⁺|KE[⁻⁺]|γ[⁻⁺]": ("superscripts − and +", "before (−) and after (+) an impact; v is the velocity, "
+                                  "KE the kinetic energy, γ the normal velocities at the contacts"),
     r"κ": ("κ", "the condition number of a matrix: how much it amplifies relative errors"),
     r"ε": ("ε", "the unit roundoff 2⁻⁵³ of double precision"),
     r"passiv\w+": ("passive", "gives no energy to whoever holds it: the stored energy never exceeds what was put in"),
@@ -69,19 +68,21 @@ TERMS: dict[str, tuple[str, str]] = {
                                             "small term added to its diagonal, and singular values of J"),
     r"anytime|stop(?:s|ped) early": ("stopped early", "the impact ends when its budget of rows or time is used up, "
                                      "with the rows resolved so far"),
-    r"(?:Newton )?LCPs?|complementarity": ("LCP", "linear complementarity problem: impulses p ≥ 0 only push, and each "
-                                           "contact either has an impulse or separates faster than the restitution "
-                                           "law demands"),
+    r"(?:Newton )?LCPs?|complementarity": ("LCP", "linear complementarity problem: impulses only push (p ≥ 0). A "
+                                           "contact with an impulse separates exactly as fast as the restitution law "
+                                           "says; a contact without one may separate faster"),
     r"NCP|CCP": ("NCP, CCP", "complementarity problems with Coulomb's friction cone: the law itself, and its convex "
                  "relaxation"),
     r"Delassus": ("Delassus matrix", "J M⁻¹ Jᵀ, the inverse mass that the contacts feel"),
-    r"trials?": ("trial", "one tested condition of a claim: it holds, fails, or is undecided"),
-    r"coherence|clustering": ("coherence, clustering", "the paper's filters of contacts: a contact near one of the "
-                              "previous step counts as the same; contacts near each other become one"),
+    r"trials?": ("trial", "one tested condition of a claim: the claim holds there, fails, or cannot be told "
+                  "(the values differ by less than their error)"),
+    r"coherence|clustering": ("coherence, clustering", "the paper's two filters. Coherence: a contact near a contact "
+                              "of the previous step is not new. Clustering: contacts near each other become one"),
     r"event[- ]driven|event by event": ("event-driven", "the exact motion between impacts, with each impact located "
                                         "in time"),
-    r"Colgate(?:'s)? (?:bound|condition)": ("Colgate's condition", "device damping b ≥ K T/2 + |B|: a sampled wall of "
-                                            "stiffness K and damping B, read every T seconds, is then passive"),
+    r"Colgate(?:'s)? (?:passivity )?(?:bound|condition)": ("Colgate's condition", "device damping b ≥ K T/2 + |B|: a "
+                                            "sampled wall of stiffness K and damping B, read every T seconds, is then "
+                                            "passive"),
     r"planted": ("planted fault", "an error put into the code on purpose, to show that the check finds it"),
     r"peg": ("peg", "the paper's example: a rectangular body, moved by the hand in a plane, that meets a corner or a "
              "hole"),

@@ -135,17 +135,17 @@ def energy_gains(batch: Batch) -> Floats:
 # C01, C02: the energy lost against the quadratic form of (18) and (24)
 
 PASSIVE = "kinetic energy does not rise"
-WITH_HALF = "loss is ½(1 − e²) of the form"
-AS_PRINTED = "loss is (1 − e²) of the form, as printed"
-EXACT_LOSS = "loss is ½(1 − e²) of the form, in rationals"
+WITH_HALF = "loss is ½(1 − e²) times the form"
+AS_PRINTED = "loss is (1 − e²) times the form, as printed"
+EXACT_LOSS = "loss is ½(1 − e²) times the form, in rationals"
 
 
 def losses(key: str, question: str, place: str, families: Sequence[Family], impacts: Mapping[str, int]) -> Check:
     """Return the claim that the loss equals the quadratic form: as printed, and with the factor ½ missing in print."""
     return batches(
         key, question, place=place, families=families, restitutions=(0.0, 0.5, 0.9, 1.0), impacts=impacts,
-        quantity="Largest relative energy gain; largest difference between the loss and the quadratic form, relative "
-        "to the energy before.",
+        quantity="Largest relative energy gain; largest difference between the energy loss and its quadratic form "
+        "vᵀJᵀW†Jv, relative to the energy before.",
         tolerance="Gain: 10 d ε √κ(M), the rounding of the returned velocities. Difference: 100 d ε κ(M), the rounding "
         "of one solve with M. In rational arithmetic: zero.",
         parts={
@@ -157,9 +157,10 @@ def losses(key: str, question: str, place: str, families: Sequence[Family], impa
         },
         exact=([family for family in families if family.condition_number == families[0].condition_number], 0.5),
         roles={AS_PRINTED: MISPRINT},
-        says=f"Relative energy gain: {{{PASSIVE}}}. The last line of the paper's own derivation (32) loses a factor ½, "
-        f"so the form printed in {place} is twice the loss. Difference between loss and form with the factor ½: "
-        f"{{{WITH_HALF}}}; without it: {{{AS_PRINTED}}}; with it, in rational arithmetic: {{{EXACT_LOSS}}}.",
+        says=f"The relative energy gain is {{{PASSIVE}}}. The last line of the paper's own derivation (32) loses a "
+        f"factor ½, so the form as printed ({place}) is twice the loss. With the factor ½, the difference between loss "
+        f"and form is {{{WITH_HALF}}}; as printed, it is {{{AS_PRINTED}}}. With the factor and in rational arithmetic, "
+        f"it is {{{EXACT_LOSS}}}.",
     )  # fmt: skip
 
 
@@ -243,8 +244,8 @@ C03 = batches(
     place="Section V-B, equations (25) and (33)",
     quantity="Distance of the two outcomes in the kinetic metric, relative to the velocity before; in rational "
     "arithmetic the number of impacts whose outcomes are not identical.",
-    tolerance="In doubles 100 d ε times the larger of κ(M) and κ(W), because both methods solve with these matrices (W "
-    "is the Delassus matrix of the independent rows). In rational arithmetic zero.",
+    tolerance="In doubles: 100 d ε times the larger of κ(M) and κ(W), because both methods solve with these matrices "
+    "(W is the Delassus matrix of the independent rows). In rational arithmetic: zero.",
     families=_ROWS, restitutions=(0.5,), impacts={"quick": 12, "full": 150}, exact=(_ROWS[::3], 0.5),
     parts={
         "pseudo-inverse, in doubles": _rows_apart(gram_pinv),
@@ -254,9 +255,10 @@ C03 = batches(
             exact_impact(case.mass_matrix, case.contact_jacobian[::-1], case.velocity, e).velocity,
             exact_impact(*case.arrays, e).velocity)),
     },
-    says="Number of states that differ in rational arithmetic: {pseudo-inverse, in rationals}; with another choice of "
-    "independent rows: {other independent rows, in rationals}. Relative difference in doubles, printed formula: "
-    "{pseudo-inverse, in doubles}; factored form: {orthonormal basis, in doubles}.",
+    says="In rational arithmetic, the number of states that differ is {pseudo-inverse, in rationals}; with another "
+    "choice of independent rows, it is {other independent rows, in rationals}. In doubles, the relative difference of "
+    "the printed formula is {pseudo-inverse, in doubles}; that of the factored form is {orthonormal basis, in "
+    "doubles}.",
 )  # fmt: skip
 
 
@@ -269,15 +271,15 @@ _ELASTIC = [Family(*size, k) for size in ((1, 1, 1), (3, 1, 1), (3, 6, 3), (6, 1
 C04 = batches(
     "C04", "With e = 1 kinetic energy is conserved.", place="Sections V-A and V-B",
     quantity="Largest relative change of kinetic energy, gain or loss.",
-    tolerance="100 d ε κ(M) in doubles, the rounding of the factorization of M; it causes losses, never gains. In "
-    "rational arithmetic zero.",
+    tolerance="In doubles: 100 d ε κ(M), the rounding of the factorization of M. This rounding loses energy and never "
+    "adds any. In rational arithmetic: zero.",
     families=_ELASTIC, restitutions=(1.0,), impacts={"quick": 12, "full": 200}, exact=(_ELASTIC[::3], 1.0),
     parts={"in doubles": Measure(lambda batch: worst(np.abs(energy_gains(batch))), solve_bound),
            "in rationals": Measure(lambda batch: worst(
                float(abs(impact.energy_after - impact.energy_before))
                for impact in (exact_impact(*case.arrays, 1) for case in batch.impacts)))},
-    says="Relative change of energy in doubles: {in doubles}. Change of energy [J] in rational arithmetic: {in "
-    "rationals}.",
+    says="In doubles, the relative change of energy is {in doubles}. In rational arithmetic, the change of energy [J] "
+    "is {in rationals}.",
 )  # fmt: skip
 
 
@@ -298,12 +300,13 @@ def _from_lcp(solver: str) -> Measure:
 C05 = batches(
     "C05", "At a single contact the impulse equals that of the complementarity formulation.",
     place="Section V-A, note to (19)",
-    quantity="Relative difference between the impulse and the multiplier of 0 <= p ⟂ γ⁺ + eγ⁻ >= 0.",
+    quantity="Relative difference between the impulse and the solution p of the LCP 0 <= p ⟂ γ⁺ + eγ⁻ >= 0.",
     tolerance="100 d ε κ(M): both methods divide by nᵀM⁻¹n, each with its own solve.",
     families=[Family(d, 1, 1, k) for d in (1, 3, 12) for k in (1e1, 1e3, 1e5)],
     restitutions=(0.0, 0.3, 1.0), impacts={"quick": 8, "full": 100},
     parts={f"LCP by {solver}": _from_lcp(solver) for solver in ("daqp", "lemke")},
-    says="Relative difference of the impulses, for each LCP solver: daqp: {LCP by daqp}; lemke: {LCP by lemke}.",
+    says="The relative difference from the impulse of the LCP solver daqp is {LCP by daqp}; from that of the LCP "
+    "solver lemke it is {LCP by lemke}.",
 )  # fmt: skip
 
 
@@ -351,8 +354,8 @@ C06 = batches(
     "C06", "The outcome of a collision does not depend on the coordinates chosen.", place="Section V-A",
     quantity="Distance in the kinetic metric between the outcome and the one computed in other coordinates and "
     "transformed back; in rational arithmetic the number of outcomes that differ.",
-    tolerance="100 d ε κ(M) κ(T)², because the transformation T gives the mass matrix TᵀMT, worse conditioned by "
-    "κ(T)². In rational arithmetic zero.",
+    tolerance="In doubles: 100 d ε κ(M) κ(T)², because the transformation T turns the mass matrix into TᵀMT, whose "
+    "condition number is larger by up to κ(T)². In rational arithmetic: zero.",
     families=_CHANGES, restitutions=(0.0, 0.7), impacts={"quick": 12, "full": 150}, exact=(_CHANGES[::2], 0.5),
     parts={
         "random change of coordinates, in doubles": Measure(_coordinates_apart, lambda batch: (
@@ -360,8 +363,8 @@ C06 = batches(
         "shear by whole numbers, in rationals": _differing(_sheared),
     },
     draw=lambda family, *given: draw_of_rank(family._replace(condition_number=MASS_CONDITION), *given),
-    says="Relative difference of the outcomes after transforming back: {random change of coordinates, in doubles}. "
-    "Number of outcomes that differ in rational arithmetic: {shear by whole numbers, in rationals}.",
+    says="After transforming back, the relative difference of the outcomes is {random change of coordinates, in "
+    "doubles}. In rational arithmetic, the number of outcomes that differ is {shear by whole numbers, in rationals}.",
 )  # fmt: skip
 
 
@@ -376,7 +379,8 @@ _PASSIVE = batches(
     families=[Family(*size, k) for size in ((1, 1, 1), (3, 6, 3), (6, 20, 4), (12, 60, 8)) for k in (1e2, 1e6)],
     restitutions=(-1.0, -0.9, -0.5, 0.0, 0.5, 0.9, 1.0), impacts={"quick": 8, "full": 150},
     parts={RANDOM: Measure(lambda batch: worst(energy_gains(batch)), energy_bound)},
-    says=f"Relative energy gain: {RANDOM} {{{RANDOM}}}; {'; '.join(f'{part} {{{part}}}' for part in RENDERED)}.",
+    says=f"Relative energy gain, {RANDOM}: {{{RANDOM}}}. "
+    f"{' '.join(f'Relative energy gain, {part}: {{{part}}}.' for part in RENDERED)}",
 )  # fmt: skip
 
 
@@ -430,9 +434,9 @@ def _without_impulse_says(table: Table) -> str:
     return (
         f"{sum(impacts.column('impacts'))} impacts with e = -1 change no velocity (largest change "
         f"{max(impacts.column('error')):.0e}). {len(once.rows)} trajectories with e = -1 differ from PB by at most "
-        f"{max(exactly.column('error')):.0e}. The paper claims no more. Beyond it: with the next double above e = -1 "
-        f"the {len(once.rows)} trajectories resolve {sum(once.column('impacts'))} collisions and differ from PB by up "
-        f"to {max(almost.column('error')):.0e} m or rad, because colliding steps have no penalty force."
+        f"{max(exactly.column('error')):.0e}. The paper claims no more. Beyond the paper: if e is the next double "
+        f"above -1, the {len(once.rows)} trajectories resolve {sum(once.column('impacts'))} collisions and differ from "
+        f"PB by up to {max(almost.column('error')):.0e} m or rad, because steps with a collision have no penalty force."
     )
 
 
@@ -440,8 +444,8 @@ C09 = Check(
     key="C09", question="With e = -1 the simulation is the penalty-based simulation.", place="Section VI",
     quantity="Largest change of velocity by an impact with e = -1; largest distance between the trajectories of "
     "device and tool and those of PB, by coordinate.",
-    tolerance="Zero at e = -1. At the next double above it 1e-11 m or rad: impulses change by 1e-16 of their size, and "
-    "contacts amplify this.",
+    tolerance="At e = -1: zero. At the next double above -1: 1e-11 m or rad, because impulses there are 1e-16 of their "
+    "usual size, and contacts amplify their effect.",
     cases=lambda study: [Family(1, 1, 1, 1e0), Family(3, 6, 3, 1e2), Family(6, 20, 4, 1e4), Family(12, 60, 8, 1e8),
                          *start_conditions(study.depth)],
     row=_without_impulse, holds=within_bound, says=_without_impulse_says, parts=["part", "coordinate"],

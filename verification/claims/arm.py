@@ -66,15 +66,16 @@ def _says(table: Table) -> str:
         a, b = (straight.where(**{"place along the second link": p}).records()[0] for p in (PLACE_A, PLACE_B))
         texts.append(f"{reading}: {a['energy before']:.4f} J before, {a['energy after']:.6f} J left at A, "
                      f"{b['energy after']:.1e} J at B")  # fmt: skip
-    return (f"With {'; with '.join(texts)}. Over all contact places and joint angles the share of energy lost is "
-            f"{min(shares):.3f} to {max(shares):.3f}.")  # fmt: skip
+    return (f"The contact is {PLACE_A} m (A) or {PLACE_B} m (B) from the elbow. With {'. With '.join(texts)}. Over all "
+            f"contact places and joint angles the share of energy lost is {min(shares):.3f} to {max(shares):.3f}.")
 
 
 C07 = Check(
     key="C07", question="A plastic collision takes all or part of the kinetic energy, depending on the geometry.",
     place="Section V-A, Fig. 2 and 3",
     quantity="Share of kinetic energy lost by the two-link arm in one frictionless collision with e = 0.",
-    tolerance="All or none of the energy, to 1e-12 of it: the rounding of one 2 x 2 factorization.",
+    tolerance="“All” means all of the energy to within 1e-12 of it, the rounding of one 2 x 2 factorization; “part” "
+    "means less.",
     cases=lambda study: [case for case in product((RODS, POINTS), ANGLES, PLACES) if case != (POINTS, 0.0, 1.0)],
     row=_struck, holds=_holds, says=_says, parts=["reading"],
     conditions=["place along the second link", "angle of the second link"],

@@ -18,7 +18,7 @@ from verification.scenes.measures import HALF_SIZE
 
 UNITS = {
     "tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",
-    "approach_velocity": "m/s", "force_limit": "F_limit",
+    "approach_velocity": "m/s", "force_limit": "times the paper's",
 }  # fmt: skip
 START = ("tilt", "clearance", "travel", "friction", "approach_velocity")  # conditions that most claims vary
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]

@@ -55,8 +55,8 @@ RESOLVED[ALL_THREE] = float(np.linalg.norm([RESOLVED["x"], RESOLVED["y"], ARM * 
 NAMED = {"x": "x", "y": "y", "theta": "rotation", ALL_THREE: "all three together"}
 LIMITED = (*START, "force_limit")
 CANNOT_TELL = (
-    "A trial cannot tell if IAPB and the nearer of the others differ by less than the ideal world's own error of "
-    "discretisation: 2.5e-5 m in x, 5e-5 m in y, 5e-3 rad in theta, 2.6e-4 m together."
+    "A trial cannot tell if the distances of IAPB and of its nearer rival differ by less than the time step's error "
+    "in the ideal world: 2.5e-5 m in x, 5e-5 m in y, 5e-3 rad in theta, 2.6e-4 m together."
 )
 WORLDS = ("IAPB", "PB", "CBuc")
 RENDERINGS = ("saturate", "scale", "spread")
@@ -113,7 +113,7 @@ def distances(study: Study, condition: Condition, rendering: str) -> Iterator[di
 def _ratios_to_pb(table: Table) -> str:
     """Return the median of distance(IAPB) / distance(PB) over the decided rows of each coordinate, in words."""
     rows = [row for row, held in zip(table.records(), table.holds, strict=True) if held is not None]
-    return ", ".join(f"{_median(row['IAPB'] / row['PB'] for row in rows if row['coordinate'] == name):.2f} in {name}"
+    return ", ".join(f"{_median(row['IAPB'] / row['PB'] for row in rows if row['coordinate'] == name):.2f} in {NAMED[name]}"
                      for name in (*COORDINATES, ALL_THREE))  # fmt: skip
 
 
@@ -166,13 +166,14 @@ def small_tilts(table: Table) -> set[float]:
 
 def _trajectory_says(table: Table) -> str:
     def counts(tilts: Iterable[float]) -> str:
-        return ", ".join(f"{held}/{decided} ({name})" for name, (held, decided) in closest_at(table, tilts).items())
+        return ", ".join(f"{held} of {decided} in {NAMED[name]}"
+                         for name, (held, decided) in closest_at(table, tilts).items())
 
     papers = table.only(part in NAMED for part in table["part"])
     return (
-        f"IAPB is closest in {counts(table['tilt'])} of the starts that can tell; together means x, y and theta in the "
-        f"kinetic metric. It depends on the tilt: up to {Condition().tilt:g} rad {counts(small_tilts(table))}; at the "
-        f"evenly spaced tilts {counts(EVEN_TILTS)}. The distance of IAPB to ideal, divided by that of PB, has these "
+        f"Of the starts that can tell, IAPB is closest in {counts(table['tilt'])} (together: in the kinetic "
+        f"metric). The counts depend on the tilt. Tilts up to {Condition().tilt:g} rad: {counts(small_tilts(table))}. "
+        f"Evenly spaced tilts: {counts(EVEN_TILTS)}. The distance of IAPB to ideal, divided by that of PB, has these "
         f"medians: {_ratios_to_pb(papers)}."
     )
 
@@ -182,8 +183,8 @@ C10 = peg_claim(
     place="Section VI, Fig. 7",
     quantity="RMS distance of the device trajectory from that of the ideal world, per coordinate and for all three "
     "together, √(x² + y² + (0.05 m θ)²), from the first contact until all four worlds have settled or the run ends. "
-    "The table also has the largest distance. A contact collides if it approaches faster than the approach velocity: "
-    "1e-6 m/s takes every approaching contact, as the paper does; larger ones are ours.",
+    "The table also has the largest distance. A contact collides if it approaches faster than a threshold, the "
+    "approach velocity. At 1e-6 m/s every approaching contact collides, as in the paper; larger thresholds are ours.",
     tolerance=f"IAPB's distance is the smallest of the three. {CANNOT_TELL}",
     cases=_all_starts, row=_trajectory, draw=_draw_twice, holds=closest, says=_trajectory_says, parts=("part",),
     roles={LARGER: BEYOND}, axes=("tilt", "clearance", "part"),
@@ -232,12 +233,13 @@ def _forces_say(table: Table) -> str:
     for coordinate, unit in (("x", "N"), ("y", "N"), ("theta", "N m")):
         rows = table.where(part=LARGE, coordinate=coordinate)
         texts.append(f"{coordinate} {max(rows.column('IAPB')):.3g} {unit} (PB {max(rows.column('PB')):.3g})")
-    rms = ", ".join(f"{sum(found)}/{len(found)} ({name})" for name in COORDINATES
+    rms = ", ".join(f"{sum(found)} of {len(found)} in {name}" for name in COORDINATES
                     for found in [table.where(part=CLOSEST_RMS, coordinate=name).decided])
     return (
-        f"Largest forces with IAPB: {', '.join(texts)}. The forces are compared by the mean of |F − F_ideal|. Beyond "
-        f"the paper: by their RMS IAPB is closest in {rms}. An impulse p is the force p/Δt over one step; in the RMS, "
-        "one that comes a step late counts twice at full height, and the more the shorter the step."
+        f"Largest forces with IAPB: {', '.join(texts)}. The distance of two forces is the mean of |F − F_ideal|. "
+        f"Beyond the paper: if the distance is the RMS of F − F_ideal, IAPB is closest in {rms}. An impulse p acts as "
+        "the force p/Δt over one step. If it comes one step later than in the ideal world, two steps enter the RMS "
+        "with p/Δt, and their weight grows as the step gets shorter."
     )
 
 
@@ -245,9 +247,11 @@ C11 = peg_claim(
     "C11", "Forces are large on new contact, only balance the hand while in contact, and are closest to ideal.",
     place="Section VI, Fig. 8",
     quantity="Peak force of the device's actuators; their mean force after settling; mean of |F − F_ideal| over the "
-    "steps. Beyond the paper: the RMS of F − F_ideal, which has no limit as the step Δt shrinks: it squares p/Δt.",
-    tolerance="Peak: larger than PB's. Mean force: within 0.05 N of the hand force, which is the damper's force at the "
-    "speed that counts as settled. Distance: strictly the smallest; a trial cannot tell if all are below 1e-9.",
+    "steps. Beyond the paper: the RMS of F − F_ideal, which grows without limit as the step Δt shrinks, because it "
+    "squares p/Δt.",
+    tolerance="Peak: larger than PB's. Mean force: within 0.05 N of the hand force; 0.05 N is the damper's force at "
+    "the largest speed that counts as settled. Distance: strictly the smallest. A trial cannot tell if all values are "
+    "below 1e-9.",
     row=_forces, holds=_forces_hold, says=_forces_say, parts=("part", "coordinate"), axes=("tilt", "clearance", "part"),
     roles={CLOSEST_RMS: BEYOND},
 )  # fmt: skip
@@ -293,7 +297,7 @@ C12 = peg_claim(
     limited=True, place="Section VI, Fig. 9",
     quantity="RMS distance of the device trajectory from that of a device without limits, per coordinate.",
     tolerance="Saturating: strictly the largest distance of the three. Spreading: strictly the smallest. A trial "
-    "cannot tell if no impulse reaches the limit or all three are within 1e-7 of the unlimited device.",
+    "cannot tell if no impulse reaches the limit, or if all three distances are below 1e-7 m or rad.",
     row=_lost, holds=_most_or_least, says=_lost_says, parts=("coordinate", "part"),
     axes=("tilt", "clearance", "coordinate", "part"),
 )  # fmt: skip
@@ -325,8 +329,8 @@ def _limited_trajectory_says(table: Table) -> str:
 C13 = peg_claim(
     "C13", "With device limits, IAPB stays closest to ideal and penetrates less than PB.",
     limited=True, place="Section VI, Fig. 10",
-    quantity="As C10, with the impulses spread over steps at 1 and 0.3 times the paper's limits; deepest overlap of "
-    "tool and walls.",
+    quantity="The distances of C10, with each impulse spread over several steps. The device's force limits are 1 or "
+    "0.3 times the paper's. Also the deepest overlap of tool and walls.",
     tolerance=f"IAPB's value is the smallest. {CANNOT_TELL}",
     row=_limited_trajectory, says=_limited_trajectory_says,
     holds=lambda row: bool(row["IAPB"] < row["PB"]) if row["coordinate"] == PENETRATION else closest(row),
@@ -368,9 +372,10 @@ def _limited_forces_say(table: Table) -> str:
 C14 = peg_claim(
     "C14", "Impulses kept within the device's limits still exceed the penalty forces felt on contact.",
     limited=True, place="Section VI, Fig. 11",
-    quantity="Peak force of the device's actuators over the run, per coordinate, IAPB spread against PB.",
-    tolerance="IAPB's peak is strictly larger. A coordinate does not count if neither peak reaches a hundredth of the "
-    "smallest force that can be felt.",
+    quantity="Peak force of the device's actuators over the run, per coordinate: of IAPB with spread impulses, and of "
+             "PB.",
+    tolerance="IAPB's peak is strictly larger. A trial cannot tell if neither peak reaches a hundredth of the smallest "
+    "force that a fingertip feels.",
     row=_limited_forces, holds=_limited_forces_hold, says=_limited_forces_say, parts=("coordinate",),
     axes=("tilt", "force_limit", "coordinate"),
 )  # fmt: skip
@@ -409,14 +414,14 @@ def _settling_says(table: Table) -> str:
     texts = []
     for rendering in ("full", "spread"):
         hops, settling = (table.where(part=part, rendering=rendering) for part in (FEWER, SETTLES))
-        times = " s against ".join(f"{np.median(settling.column(world)):.2f}" for world in ("IAPB", "PB"))
+        times = " s, with PB ".join(f"{np.median(settling.column(world)):.2f}" for world in ("IAPB", "PB"))
         pairs = list(zip(hops.column("IAPB"), hops.column("PB"), strict=True))
         fewer, same = sum(a < b for a, b in pairs), sum(a == b for a, b in pairs)
         texts.append(
-            f"IAPB with impulses rendered in {rendering}: {sum(a for a, _ in pairs)} bounces in {len(pairs)} runs "
-            f"against {sum(b for _, b in pairs)} with PB; fewer in {fewer} runs, as many in {same} "
-            f"({pairs.count((0, 0))} without a bounce in either world), more in {len(pairs) - fewer - same}; median "
-            f"settling time {times} s."
+            f"With {rendering} impulses the peg bounces {sum(a for a, _ in pairs)} times in {len(pairs)} runs, with PB "
+            f"{sum(b for _, b in pairs)} times. It bounces less often than with PB in {fewer} runs, as often in {same} "
+            f"(never in either world in {pairs.count((0, 0))} of these), and more often in "
+            f"{len(pairs) - fewer - same}. The median settling time is {times} s."
         )
     return " ".join(texts)
 
@@ -426,8 +431,9 @@ C15 = peg_claim(
     place="Section VII, Fig. 12 and 13 (an experiment there; an emulated device here)",
     quantity="How often a corner of the device's peg leaves a wall by more than 10 µm after touching it; time from "
     "the first contact until the device stays below 1 mm/s and 0.01 rad/s.",
-    tolerance="Strictly fewer bounces, and strictly sooner; a tie does not count. A separate part tests whether "
-    "IAPB bounces at most as often. A trial decides nothing where the peg bounces, or settles, in neither world.",
+    tolerance="Strictly fewer bounces, and strictly sooner: a tie fails. A separate part tests whether IAPB bounces at "
+    "most as often. A trial cannot tell about bounces if neither world has any, nor about settling if the peg settles "
+    "in neither.",
     row=_settling, holds=_settling_holds, says=_settling_says, parts=("part",), conditions=(*START, "rendering"),
     named={FEWER: "bounces", NO_MORE: "bounces", SETTLES: "settling time"},
     axes=("tilt", "clearance", "part"),

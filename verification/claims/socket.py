@@ -104,10 +104,10 @@ def _bouncing(failures: Table) -> str:
 
 C18 = Check(
     key="C18", question="Clustering and temporal coherence remove false collisions.", place="Section III",
-    quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. In the round "
-    "socket that the facets approximate there are none, so each is false.",
-    tolerance="No false collision remains. A trial cannot tell if its coherence distance is not above speed × step, "
-    "because the paper requires this.",
+    quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. The "
+    "facets approximate a round socket, in which a rolling ball does not collide again; so each collision is false.",
+    tolerance="No false collision remains. The paper requires a coherence distance above speed × step; a trial without "
+    "such a distance cannot tell.",
     cases=_cases, row=_row, holds=_holds, says=_says, draw=_draw, parts=["part"],
     roles={CLUSTERING: BEYOND}, named={SHORT: "coherence distances short of the next facet"},
     conditions=["cluster_distance", "coherence_distance", "damping", "rate"],

@@ -40,16 +40,16 @@ def _fresh_sizes(study: Study, region: Region) -> Iterator[Sizes]:
 def _rate_says(table: Table) -> str:
     texts = [f"{method}: " + ", ".join(f"{count} at d = {d}" for d, count in most.items())
              for method, most in most_contacts(table).items()]  # fmt: skip
-    return ("Largest number of contacts at which 99.9 % of the impacts take less than 1 ms, on this machine: "
-            f"{'; '.join(texts)}.")  # fmt: skip
+    return ("Largest number of contacts at which 99.9 % of the impacts take less than 1 ms on this machine, with d "
+            f"coordinates: {'; '.join(texts)}.")  # fmt: skip
 
 
 C19 = Check(
     key="C19", question="One pseudo-inverse per step meets the haptic rate with many simultaneous collisions.",
     place="Sections VII and VIII, as an open question",
-    quantity="Number of impacts, out of 1000 in a row, that take longer than 1 ms. The c contact rows have rank two "
-    "thirds of d coordinates. Methods: the printed formula (21) in numpy, and its factored form, compiled. Once a size "
-    "is too slow, larger sizes are not tried. Times are CPU times of the thread on this machine.",
+    quantity="Number of impacts, out of 1000 in a row, that take longer than 1 ms. The rank of the rows is two thirds "
+    "of the number d of coordinates. Methods: the printed formula (21) in numpy, and its factored form, compiled. Once "
+    "a size is too slow, larger sizes are not tried. Times are CPU times of the thread on this machine.",
     tolerance="At most one call in a thousand is late. A size that fails is tried three times.",
     cases=lambda study: [Sizes(d, method) for d in COORDINATES for method in TITLES], draw=_fresh_sizes,
     row=lambda study, case: haptic_rate(case.coordinates, case.method, case.contacts, failures=study.failures),
@@ -114,10 +114,10 @@ def _ratio_says(table: Table) -> str:
     for part in dict.fromkeys(table.column("problem")):
         rows = table.where(problem=part)
         ratios = [ratio for ratio in rows.column("ratio") if ratio is not None]
-        texts.append(f"{part}: {min(ratios):.2g} to {max(ratios):.2g}, median {np.median(ratios):.2g}, above 1 in "
-                     f"{sum(rows.decided)} of the {len(rows.decided)} sizes that differ clearly, "
-                     f"{len(rows.rows) - len(rows.decided)} of {len(rows.rows)} sizes cannot tell")  # fmt: skip
-    return f"Time of one impact by Lemke's method, divided by that of IAPB, both compiled: {'; '.join(texts)}."
+        texts.append(f"For {part} it is {min(ratios):.2g} to {max(ratios):.2g} (median {np.median(ratios):.2g}); of "
+                     f"the {len(rows.decided)} sizes that differ clearly, {sum(rows.decided)} are above 1, and "
+                     f"{len(rows.rows) - len(rows.decided)} of {len(rows.rows)} sizes cannot tell.")  # fmt: skip
+    return f"The ratio is the time of one impact by Lemke's method over that by IAPB, both compiled. {' '.join(texts)}"
 
 
 C22 = Check(
@@ -128,7 +128,7 @@ C22 = Check(
     "(none redundant), and both methods have the same v⁺. Calls from Python are not part of the claim.",
     tolerance="A trial holds if the lower quartile of the ratios is at least 1.1, and fails if the upper quartile is "
     "at most 1/1.1; in between it cannot tell. On a busy machine the median ratio of a size moved by up to 40 % "
-    "between runs, so a single size can turn round.",
+    "between runs, so the outcome of a single size can change.",
     cases=lambda study: [Impact(problem, contacts) for contacts in SIZES for problem in PROBLEMS],
     row=_ratio, holds=costs_more, says=_ratio_says, draw=_new_sizes, parts=["problem"], conditions=["contacts"],
     timed=TIMES, timed_rows=True, axes=("contacts", "decades", "problem"),

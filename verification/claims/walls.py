@@ -74,12 +74,13 @@ def _losses_say(table: Table) -> str:
         total = [1e3 * pick(every.column("lost")) for pick in (min, max)]
         penalty = [1e3 * pick(first.column("PB, lost within 20 ms")) for pick in (min, max)]
         texts.append(
-            f"At a tilt of {tilt:g} rad the first impact takes {1e3 * reference:.4g} mJ, for all walls alike within "
-            f"{np.ptp(losses) / reference:.0e}; all impacts of a run take {total[0]:.3g} to {total[1]:.3g} mJ, "
-            f"depending on the wall. PB takes {penalty[0]:.2g} to {penalty[1]:.3g} mJ within 20 ms."
+            f"At a tilt of {tilt:g} rad the first impact takes {1e3 * reference:.4g} mJ; between the walls this varies "
+            f"by {np.ptp(losses) / reference:.0e} of it. All impacts of a run together take {total[0]:.3g} to "
+            f"{total[1]:.3g} mJ, depending on the wall. PB takes {penalty[0]:.2g} to {penalty[1]:.3g} mJ in the first "
+            "20 ms of contact."
         )
-    return (f"{' '.join(texts)} The claim is about one collision. All impacts of a run are beyond it: later ones start "
-            "from states that the walls changed.")  # fmt: skip
+    return (f"{' '.join(texts)} The claim is about one collision. The sum over all impacts goes beyond the claim, "
+            "because later impacts start from states that the walls have changed.")
 
 
 C17 = Check(
@@ -87,8 +88,8 @@ C17 = Check(
     place="Section II",
     quantity="Kinetic energy lost in the first impact, and in all impacts of the run, compared with that at the "
     "paper's walls. The table also has the energy that PB takes.",
-    tolerance="1e-12 of the loss. The state before the first impact is the same to the last bit for all walls, so a "
-    "loss that does not depend on the walls is the same as well.",
+    tolerance="1e-12 of the loss. The state before the first impact is the same to the last bit for all walls. So the "
+    "loss must be the same as well if it does not depend on the walls.",
     cases=lambda study: [Condition(tilt, stiffness=stiffness, damping=damping) for tilt in (0.0, 0.1)
                          for stiffness in STIFFNESSES for damping in DAMPINGS],
     row=_losses, holds=_loss_holds, says=_losses_say, parts=["part"], conditions=["tilt", "stiffness", "damping"],
@@ -133,10 +134,10 @@ def _leak_says(table: Table) -> str:
     undamped = table.where(**{"device damping": 0.0})
     most, fed = max(undamped.column("energy from the wall")), sum(map(_leaks, undamped.records()))
     worst = max(row["energy from the wall"] / row["wall's turnover"] for row in table.records() if _within(row))
-    return (f"If b >= KT/2 + B, the hand draws at most {worst:.0e} of the energy exchanged from a wall; otherwise it "
-            f"can draw energy without limit. The paper's device has no damping: it gains energy at {fed} of "
-            f"{len(undamped.rows)} walls (up to {most:.2g} J in {_STEPS} samples), so its contacts are stable only "
-            "because of the hand and the coupling.")
+    return (f"If the device damping b is at least KT/2 + B, the hand draws at most {worst:.0e} of the energy exchanged "
+            "from a wall. Otherwise the hand can draw energy without limit. A device without damping, as in the paper, "
+            f"draws energy from {fed} of {len(undamped.rows)} walls (up to {most:.2g} J in {_STEPS} samples). Its "
+            "contacts are stable only because of the hand and the coupling.")
 
 
 C20 = Check(
@@ -157,10 +158,10 @@ C20 = Check(
 # C21: impulses against larger damping
 
 SAME_DAMPING, EQUAL_GAIN, BOTH, BOTH_SOONER, TUNED = RIVALS = (
-    "same damping: settles no later", "penalties with the damping of equal force: settles no later",
-    "best damping for each wall on both sides: settles at all",
-    "best damping for each wall on both sides: settles no later",
-    "best larger damping for each wall with penalties only: settles no later",
+    "same damping: impulses settle no later", "penalty damping that gives the same force: impulses settle no later",
+    "best damping of each law for each wall: impulses settle wherever penalties do",
+    "best damping of each law for each wall: impulses settle no later",
+    "best damping for each wall for penalties only: impulses settle no later",
 )
 FRESH = 5  # number of walls per loop drawn to confirm a region
 Case = tuple[Loop, Floats]  # and the stiffnesses of its walls
@@ -215,21 +216,21 @@ def _settling_says(table: Table) -> str:
                         "with penalties")  # fmt: skip
     sooner = table.where(against=BOTH_SOONER).decided
     return (
-        f"At the paper's damping of 50 N s/m {never[SAME_DAMPING]}; against penalties whose damping gives the force of "
-        f"the impulse, {never[EQUAL_GAIN]}; with the best damping for each wall on both sides, {never[BOTH]}. "
-        f"Beyond the paper: with both tuned, impulses settle no later at {sum(sooner)} of {len(sooner)} walls. The "
-        "paper does not claim that: it says that guidelines for a large stable damping are not available."
+        f"At the paper's damping of 50 N s/m, {never[SAME_DAMPING]}. If the penalties' damping gives the force of the "
+        f"impulse, {never[EQUAL_GAIN]}. With the best damping of each law for each wall, {never[BOTH]}. Beyond the "
+        f"paper: with these best dampings, impulses settle no later than penalties at {sum(sooner)} of {len(sooner)} "
+        "walls. The paper does not claim this; it says that there are no guidelines for a large stable damping."
     )
 
 
 C21 = Check(
     key="C21", question="Impulse forces make contact more stable than raising the damping does.", place="Section VII",
     quantity="Settling time of a mass of 2 kg that the hand pushes against a sampled wall; its motion between samples "
-    "is exact. Impulses at the paper's damping are compared with penalties at the same damping, and at the damping "
-    "(1 + e) m/T whose force at first contact equals the impulse's: the paper's damping of equivalent gain. With the "
-    "best damping from 50 N s/m, chosen afterwards for each wall and on both sides, the mass must settle with impulses "
-    "wherever it does with penalties. Beyond the paper: who settles sooner where dampings are tuned.",
-    tolerance="None: the law with the smaller time wins. A wall cannot tell if the mass settles with neither.",
+    "is exact. Impulses at the paper's damping are compared with penalties at the same damping, and with penalties at "
+    "the damping (1 + e) m/T, whose force at first contact equals that of the impulse (in the paper: equivalent gain). "
+    "Then each law gets its best damping of at least 50 N s/m for each wall, chosen afterwards; the mass must settle "
+    "with impulses wherever it settles with penalties. Beyond the paper: which law settles sooner at such dampings.",
+    tolerance="None: the law with the smaller time wins. A trial cannot tell if the mass settles with neither law.",
     roles={BOTH_SOONER: BEYOND, TUNED: BEYOND},
     cases=lambda study: [(loop, grid(study.depth)[0]) for loop in loops()], row=_settling, holds=_settles,
     says=_settling_says, draw=_draw, parts=["against"],

@@ -112,7 +112,7 @@ def test_failures_are_told_apart_by_part_with_their_conditions():
     found = concluded(("x", 0.0, 0.5), ("x", 0.3, 2.0), ("y", 0.0, 0.5), ("y", 0.3, 0.5))
     x, y = found.parts
     assert (found.verdict, x.verdict, y.verdict) == (MIXED, MIXED, REPRODUCED)
-    assert x.fails == "in 10 of 20 trials, with tilt 0.3 rad" and y.fails == ""
+    assert x.fails == "in 10 of 20 trials, under these conditions: tilt 0.3 rad" and y.fails == ""
     assert found.details["conditions"] == "tilt 0, 0.3 rad"
     assert (x.held, x.decided, y.held, y.decided) == (10, 20, 20, 20)
 
@@ -135,13 +135,13 @@ def test_few_trials_reproduce_nothing_but_one_that_fails_counts(held, failed, ve
     outcomes = [YES] * held + [NO] * failed + [UNKNOWN] * 3
     part = judge_part("x", table([{"tilt [rad]": 0.0}] * len(outcomes), outcomes))
     assert part.verdict == verdict
-    assert ("fewer than 10 decide" in part.sentence) == (held + failed < LEAST_DECIDED)
+    assert ("fewer than 10 trials can tell" in part.sentence) == (held + failed < LEAST_DECIDED)
 
 
 def test_a_trial_may_stand_for_many_cases():
     of = {n: judge_part("x", table([{"impacts": n}] * 2, [YES, UNKNOWN], cases=["impacts"])) for n in (9, 10)}
     assert of[9].verdict == NOT_TESTABLE and of[10].verdict == REPRODUCED
-    assert of[10].sentence == "holds in 1 of 1 trials; 1 of 2 cannot tell, which stand for 10 cases."
+    assert of[10].sentence == "holds in 1 of 1 trials; 1 of 2 cannot tell (10 cases in all)."
 
 
 def trials(holds, widths=(1.0, 2.0, 3.0, 4.0)):
