@@ -79,7 +79,7 @@ def _placed(kind, first, count, body, vertices, center, frames, axes, origins): 
 @numba.njit(cache=True, fastmath=False)
 def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin, ids, values):  # type: ignore[no-untyped-def]
     """Write the contacts of all pairs; return their number."""
-    n = 0
+    n = np.int64(0)  # numba would compile every function that takes n twice: for the literal 0, and for a variable
     for k in range(len(pairs)):
         a, b, start = pairs[k, 0], pairs[k, 1], n
         ka, kb = kind[a], kind[b]
@@ -308,7 +308,7 @@ def _corners(ref, other, sign, margin, ids, values, n):  # type: ignore[no-untyp
 def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  # type: ignore[no-untyped-def]
     """Write contacts of two boxes: by the axis of largest separation among 15, a clipped face or two edges."""
     apart, size = center_a - center_b, half_a.sum() + half_b.sum()
-    face, best, most, edge_i, edge_j, edge_best = -1, -np.inf, -np.inf, 0, 0, -np.inf
+    face, edge_i, edge_j, best, most, edge_best = np.int64(-1), np.int64(0), np.int64(0), -np.inf, -np.inf, -np.inf
     for k in range(6):
         m = A[:, k].copy() if k < 3 else B[:, k - 3].copy()
         separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
@@ -377,7 +377,7 @@ def _clipped_face(center, axes, half, face, center_o, axes_o, half_o, sign, sepa
     facing = int(np.argmax(np.abs(over)))
     i1, i2, side = (facing + 1) % 3, (facing + 2) % 3, -1.0 if over[facing] > 0.0 else 1.0
     middle = apart + side * half_o[facing] * axes_o[:, facing] - half[face] * m
-    patch, lines, length = np.empty((16, 3)), np.empty((16, 2), np.int64), 4
+    patch, lines, length = np.empty((16, 3)), np.empty((16, 2), np.int64), np.int64(4)
     # around the incident face; a corner lies on two of its edges, numbered 0 to 3
     for c, (along, across) in enumerate(((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))):
         x = middle + along * half_o[i1] * axes_o[:, i1] + across * half_o[i2] * axes_o[:, i2]
