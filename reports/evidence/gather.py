@@ -28,6 +28,7 @@ from verification import haptic_rate
 from verification.check import Study
 from verification.claims import peg
 from verification.cost import effects
+from verification.cost.steps import compile_parts
 from verification.finding import Failure, Finding, attempt
 from verification.hard_cases.findings import on_hard_cases
 from verification.proofs import on_proofs
@@ -46,9 +47,10 @@ UNNAMED = "the report"  # the user of a run that no claim, topic or figure reque
 SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link_arm_b", "arm_pushing")
 FIGURE_RUNS = "runs of the figures"
 CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
-# The first stages to be computed: the figures' runs compile the engine, proofs need no engine, claims take longest.
+# The first stages to be computed: one worker compiles the engine for the figures' runs, while the other needs no engine
+# for proofs and the slowest runs. The stages after them are shorter.
 ON_THE_PEG = "claims on the peg"
-FIRST = ("Coq development", "proofs", ON_THE_PEG, "claims")
+FIRST = ("Coq development", "proofs", ON_THE_PEG, "properties", "claims")
 PAUSE = 0.2  # [s] between two looks at what the workers say
 
 
@@ -118,13 +120,16 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
     If a worker is killed because memory ran out, its stage stays missing; it is computed alone after that.
     """
     order = sorted(stages, key=lambda name: FIRST.index(name) if name in FIRST else len(FIRST))
-    ahead = [name for name in order
-             if not (plans()[name].timed or name == CERTIFIED or stages[name].path.is_file())]  # fmt: skip
+    missing = [name for name in order if not stages[name].path.is_file()]
+    ahead = [name for name in missing if not (plans()[name].timed or name == CERTIFIED)]
     if not ahead:
         return
     with suppress(IapbError), batches.worker_pool(batches.cores()) as pool:
-        running = {pool.submit(_figure_runs, out)} | {pool.submit(_filled, stages[name], out, depth) for name in ahead}
-        running |= {pool.submit(_slowest_runs, out, depth)} if ON_THE_PEG in ahead else set()
+        running = {pool.submit(_figure_runs, out)}
+        for name in ahead:
+            running |= {pool.submit(_slowest_runs, out, depth)} if name == ON_THE_PEG else set()
+            running |= {pool.submit(_filled, stages[name], out, depth)}
+        running |= {pool.submit(compile_parts)} if haptic_rate.TOPIC.key in missing else set()
         while running:
             done, running = wait(running, PAUSE, FIRST_COMPLETED)
             stages |= {stage.name: stage for future in done if isinstance(stage := future.result(), Stage)}
@@ -139,7 +144,7 @@ def _figure_runs(out: Path) -> Stage | None:
 
 
 def _slowest_runs(out: Path, depth: str) -> None:
-    """Simulate runs of the claims on the peg, in a worker without work, until one exists: the last first."""
+    """Simulate runs of the claims on the peg, in a worker, until one exists: the last first."""
     runner = Runner(out / "runs")
     for scene, world in peg.slowest_runs(Study(runner, depth)):
         if (out / "runs" / runner.file_of(scene, world)).is_file():
