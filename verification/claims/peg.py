@@ -113,8 +113,8 @@ def distances(study: Study, condition: Condition, rendering: str) -> Iterator[di
 def _ratios_to_pb(table: Table) -> str:
     """Return the median of distance(IAPB) / distance(PB) over the decided rows of each coordinate, in words."""
     rows = [row for row, held in zip(table.records(), table.holds, strict=True) if held is not None]
-    return ", ".join(f"{_median(row['IAPB'] / row['PB'] for row in rows if row['coordinate'] == name):.2f} in {NAMED[name]}"
-                     for name in (*COORDINATES, ALL_THREE))  # fmt: skip
+    return ", ".join(f"{_median(row['IAPB'] / row['PB'] for row in rows if row['coordinate'] == name):.2f} in {named}"
+                     for name, named in NAMED.items())  # fmt: skip
 
 
 def _median(values: Iterable[float]) -> float:
@@ -171,7 +171,7 @@ def _trajectory_says(table: Table) -> str:
 
     papers = table.only(part in NAMED for part in table["part"])
     return (
-        f"Of the starts that can tell, IAPB is closest in {counts(table['tilt'])} (together: in the kinetic "
+        f"Of the starts that can tell, IAPB is closest in {counts(table['tilt'])} (in the kinetic "
         f"metric). The counts depend on the tilt. Tilts up to {Condition().tilt:g} rad: {counts(small_tilts(table))}. "
         f"Evenly spaced tilts: {counts(EVEN_TILTS)}. The distance of IAPB to ideal, divided by that of PB, has these "
         f"medians: {_ratios_to_pb(papers)}."
