@@ -73,7 +73,7 @@ class Contact(ScenePart):
         "friction hold it; default false")
     forces: Literal["implicit", "paper"] = Field("implicit", description="implicit (default): resting forces that no "
         "stiffness or step makes unstable, friction in impacts, stiffness and damping chosen for a sag below 0.1 mm; "
-        "paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; contact: paper is short for it")
+        "paper: explicit (5), impacts without friction, K = 1000, B = 50; contact: paper is short for it")
     stiffness: Gain = Field(1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen")
     damping: Gain = Field(50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen")
     penalty: Literal["clamped", "printed"] = Field("clamped", description="clamped (default): never pulls; printed: "

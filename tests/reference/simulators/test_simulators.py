@@ -99,7 +99,7 @@ def test_damping_gives_the_restitution_asked_for(restitution):
     assert -v == pytest.approx(restitution, rel=1e-2)
 
 
-@pytest.mark.parametrize(("name", "module"), [("mujoco", "mujoco"), ("bullet", "pybullet"), ("drake", "pydrake")])
+@pytest.mark.parametrize(("name", "module"), [("mujoco", "mujoco"), ("bullet", "pybullet"), ("drake", "pydrake.all")])
 def test_missing_engine_says_how_to_install_it(monkeypatch, name, module):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingDependencyError, match=r"\[peers\]"):
