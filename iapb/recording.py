@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iapb.advice.distrust import distrust_of
 from iapb.compiled import block, copy_into, kernel
 from iapb.contact.kernels.step import contact_state
-from iapb.haptics.kernels import PLANNED
+from iapb.haptics.rendering import PLANNED
 from iapb.linalg import load, store
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.mechanism import Mechanism

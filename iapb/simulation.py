@@ -31,7 +31,7 @@ from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult,
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
-from iapb.haptics.kernels import NO_COUPLING, couple, drive_device, move_device, render
+from iapb.haptics.rendering import NO_COUPLING, couple, drive_device, move_device, render
 from iapb.recording import Recorder, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene

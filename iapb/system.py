@@ -13,17 +13,17 @@ from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for, 
 from iapb.compiled import Entry, block, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
-from iapb.contact.kernels.coulomb import RestWork
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
+from iapb.contact.kernels.step_friction import RestWork
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.contact.kernels.world import State, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
-from iapb.haptics.kernels import PLANNED, Port
+from iapb.haptics.rendering import PLANNED, Port
 from iapb.haptics.waveforms import waveform_weights
 from iapb.linalg import cholesky
 from iapb.mechanics.integrators import INTEGRATORS

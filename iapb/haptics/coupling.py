@@ -1,6 +1,6 @@
 """Couplings between the device and the virtual tool: Fig. 5 and Table I of the paper.
 
-A coupling is data; `iapb.haptics.kernels` computes the forces. With x_t, x_d the coordinates of tool and device,
+A coupling is data; `iapb.haptics.rendering` computes the forces. With x_t, x_d the coordinates of tool and device,
 PD = K (x_d − x_t) + B (ẋ_d − ẋ_t):
 
 - four-channel controller: tool M ẍ_t = F_h + F_env + PD, device M ẍ_d = F_h + F_env,applied − PD;

@@ -1,7 +1,7 @@
 """The haptic device: the protocol of any device, and a simulated device (paper section VI: pure inertia).
 
 Coordinates are those of the hand-held tool, to which the device is kinematically equal. The compiled loop
-simulates its device in `iapb.haptics.kernels`; `SimulatedDevice` is the same device, with a constant mass matrix,
+simulates its device in `iapb.haptics.rendering`; `SimulatedDevice` is the same device, with a constant mass matrix,
 for loops and laws written in Python.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from iapb.compiled import Entry
 from iapb.errors import ArgumentError, IapbError
-from iapb.haptics.kernels import NO_COUPLING, UNILATERAL, engage, observe_work
+from iapb.haptics.rendering import NO_COUPLING, UNILATERAL, engage, observe_work
 from iapb.linalg import cholesky, solve_mass
 from iapb.mechanics.bodies import finite_array
 from iapb.schema import Floats

@@ -27,7 +27,7 @@ from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.step import clear, find_contacts, locate, move
 from iapb.errors import installing
-from iapb.haptics.kernels import couple, drive_device
+from iapb.haptics.rendering import couple, drive_device
 from iapb.recording import Recorder, make_record, write_step
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.simulation import Simulation

@@ -19,7 +19,7 @@ from iapb.contact.kernels.impact import factored_impact, rank_tolerance, whiten_
 from iapb.contact.kernels.impact_friction import add_impact_friction, sweep_impact
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.passive import passive_step, write_step
-from iapb.contact.kernels.projector import minimum_norm_impulses, orthonormal_basis
+from iapb.contact.kernels.row_basis import minimum_norm_impulses, orthonormal_basis
 from iapb.contact.kernels.rows import body_row, contact_velocities, direction_row, friction_of, tangent_of
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.contact.kernels.unilateral import poisson_impact

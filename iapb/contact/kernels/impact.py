@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.passive import UNIT, passive_step, write_step
-from iapb.contact.kernels.projector import orthonormal_basis
+from iapb.contact.kernels.row_basis import orthonormal_basis
 from iapb.double_double import add_product, symmetric_entry
 from iapb.linalg import add_multiple, dot_of, from_whitened, to_momentum, to_whitened, whiten_columns
 from iapb.schema import Floats

@@ -21,7 +21,7 @@ from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import apply_change
-from iapb.contact.kernels.projector import add_minimum_norm, minimum_norm_factors
+from iapb.contact.kernels.row_basis import add_minimum_norm, minimum_norm_factors
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
 from iapb.linalg import add_multiple, dot_of, from_whitened, orthogonalize

@@ -22,9 +22,9 @@ import math
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import LEFT, TOUCHING, contact_before, group_of_contact
-from iapb.contact.kernels.coulomb import trees_of_contact
 from iapb.contact.kernels.impact_friction import add_along_row, along_row
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
+from iapb.contact.kernels.step_friction import trees_of_contact
 from iapb.linalg import add, add_multiple, dot_of, load, scale, store
 
 STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip

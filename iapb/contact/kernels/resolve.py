@@ -16,7 +16,7 @@ from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance, whiten_impact
 from iapb.contact.kernels.impact_friction import FrictionWork, add_impact_friction
 from iapb.contact.kernels.passive import gain_enclosure, passive_step
-from iapb.contact.kernels.projector import minimum_norm_impulses
+from iapb.contact.kernels.row_basis import minimum_norm_impulses
 from iapb.contact.kernels.unilateral import PushWork, poisson_impact
 from iapb.double_double import kinetic_energies
 from iapb.linalg import add_multiple, all_finite, cholesky, dot_of

@@ -10,7 +10,6 @@ from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import TOUCHING, classify, cluster, group_of_contact, mark_new
-from iapb.contact.kernels.coulomb import add_step_friction
 from iapb.contact.kernels.implicit import rest_implicitly
 from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
@@ -18,6 +17,7 @@ from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities
 from iapb.contact.kernels.seams import leave_out_seams
 from iapb.contact.kernels.shape_frames import copy_contact
+from iapb.contact.kernels.step_friction import add_step_friction
 from iapb.linalg import (
     add,
     add_multiple,

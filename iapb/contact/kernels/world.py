@@ -8,9 +8,9 @@ import numpy as np
 
 from iapb.contact.geometry import ContactBuffer, Shapes
 from iapb.contact.kernels.broadphase import BroadPhase
-from iapb.contact.kernels.coulomb import RestWork
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
+from iapb.contact.kernels.step_friction import RestWork
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.free_motion import FreeMotion

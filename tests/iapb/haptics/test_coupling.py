@@ -11,7 +11,7 @@ from iapb.contact.kernels.step import advance
 from iapb.contact.laws import Penalty
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling, UnilateralCoupler
-from iapb.haptics.kernels import couple, drive_device
+from iapb.haptics.rendering import couple, drive_device
 from iapb.scene import find_scene, load_scene
 from iapb.system import System
 

@@ -13,7 +13,7 @@ from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.haptics.device import DeviceReading, SimulatedDevice
-from iapb.haptics.kernels import engage, inside, move_device
+from iapb.haptics.rendering import engage, inside, move_device
 from iapb.recording import Recorder
 from iapb.run import FREE, RESTING
 from iapb.scene import find_scene, load_scene, scene_from_text

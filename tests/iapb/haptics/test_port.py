@@ -9,7 +9,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
-from iapb.haptics.kernels import command, couple, observe_work, shape_impulse
+from iapb.haptics.rendering import command, couple, observe_work, shape_impulse
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.system import System
 
