@@ -192,7 +192,7 @@ class Check:
         if self.says is None:
             if self.holds is None and not table.holds:
                 return ()
-            held = f"{sum(table.decided)} of {len(table.decided)} rows hold.{_spans(table, self.spans)}"
+            held = f"{sum(table.decided)} of {len(table.decided)} rows of the table hold.{_spans(table, self.spans)}"
             said: Said = Part(f"{self.question} {held}", "", timed=any(column.timed for column in table.columns),
                               asked=self.question, measured=held, target="every row")  # fmt: skip
         else:

@@ -164,7 +164,8 @@ def told(rows: Sequence[Row]) -> tuple[str, str]:
     at = "with its own settings" if first["settings"] == OWN else f"with a step of {1e3 * MATCHED_STEP:g} ms"
     rise = max(row["largest rise of energy"] or 0.0 for row in rows)
     return (f"{first['engine']} {first['version']}, {at}: scenes with the known outcome",
-            f"{_met(rows)} of {len(rows)}{missed and f'; not {missed}'}. Energy rises by at most {rise:.2g}")
+            f"{_met(rows)} of {len(rows)}{missed and f'; not in {missed}'}. Largest relative rise of energy: "
+            f"{rise:.2g}")
 
 
 def _worst(row: Row) -> str:
@@ -227,30 +228,30 @@ def _met(rows: Sequence[Row]) -> int:
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     present = sorted(_present(tables["errors"]), key=lambda row: (not _is_ours(row), row["engine"]))
     own, matched = ([row for row in present if row["settings"] == choice] for choice in SETTINGS)
-    said = "; by ".join(f"{engine}: {missed}" for engine, rows in groupby(present, key=lambda row: row["engine"])
+    said = "; in ".join(f"{engine}: {missed}" for engine, rows in groupby(present, key=lambda row: row["engine"])
                         if (missed := _misses(rows)))  # fmt: skip
     return (
-        f"{len({row['engine'] for row in present})} engines on {len({row['scene'] for row in present})} scenes of "
-        f"known outcome: the outcome is right in {_met(own)} of {len(own)} runs with the engine's own settings and in "
-        f"{_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Missed by {said}." if said else "")
+        f"{len({row['engine'] for row in present})} engines simulate {len({row['scene'] for row in present})} scenes "
+        f"of known outcome. The outcome is right in {_met(own)} of {len(own)} runs with the engine's own settings and "
+        f"in {_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Wrong in {said}." if said else "")
     )
 
 
 ERRORS = Check(
     key="errors", question="Does the engine give the known outcome?",
     cases=lambda study: product(SIMULATORS, FIXED_SCENES), row=_rows, says=_says, digits=2,
-    note="Errors are relative to the kinetic energy at the start, to the sum of m |v| and to the largest speed; in "
-    "resting scenes the rise of energy is relative to m g times the bodies' size. Law met: all errors are at most 1 %, "
-    "or, in resting scenes, nothing moves by more than 1 mm.",
+    note="The errors of energy, momentum and velocity are relative to the kinetic energy at the start, the sum of m "
+    "|v| and the largest speed. In resting scenes the rise of energy is relative to m g times the bodies' size. The "
+    "law is met if all errors are at most 1 % or, in resting scenes, if nothing moves by more than 1 mm.",
 )
 engines = Topic(
     key="engines", title="Other engines",
-    question="Every installed engine simulates eight frictionless scenes of known outcome: conservation of energy and "
-    "momentum with symmetry determine the outcome, or nothing may move. Each scene runs twice: with the settings that "
-    "suit the engine best, and with a time step of 1 ms. One rule chooses the settings of other engines: the smallest "
-    "error on a grid (docs/engines.md). Ours run with their defaults. One program computes energy, momentum and "
-    "overlap from the positions and velocities of all engines. MuJoCo and Drake have no coefficient of restitution; "
-    "springs with suitable damping replace it.",
+    question="Every installed engine simulates eight frictionless scenes of known outcome: either symmetry and the "
+    "conservation of energy and momentum determine it, or nothing may move. Each scene runs twice: with the settings "
+    "that suit the engine best, and with a time step of 1 ms. The settings of other engines are those with the "
+    "smallest error on a grid of settings (docs/engines.md). Our own engine and our ideal world run with their "
+    "defaults. One program computes energy, momentum and overlap from the positions and velocities of all engines. "
+    "MuJoCo and Drake have no coefficient of restitution; springs with suitable damping replace it.",
     checks=(ERRORS, Check(key="settings", question="With which settings did the engines run?",
                           cases=lambda study: SIMULATORS, row=_settings)),
     says=_answer,

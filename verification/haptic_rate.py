@@ -39,17 +39,17 @@ def _kernels_say(table: Table) -> Part:
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:
     met = f"{sum(part.verdict == REPRODUCED for part in parts)} of {len(parts)}"
-    answer = f"{met} of our own speed targets met"
+    answer = f"{met} of our own speed targets are met."
     for contacts, _, _, ratio in list(printed_over_factored(tables[SCALING.key]))[-1:]:
-        answer += f"; with {contacts} contacts the engine's impact is {ratio:.0f} times as fast as the printed formula"
-    return Part(f"{answer}.", "", quantities=(("speed targets", met),))
+        answer += f" With {contacts} contacts the engine's impact is {ratio:.0f} times as fast as the printed formula."
+    return Part(answer, "", quantities=(("speed targets", met),))
 
 
 _MOST = {title: f"most contacts, {title.removeprefix('the ')}" for title in TITLES.values()}
 RATE = Check(
     key="contacts at 1 kHz", question="How many contacts does a millisecond allow?", row=lambda _, row: row, digits=6,
     cases=lambda study: list(_rates(study.table(C19))), timed=tuple(_MOST.values()),
-    note="Largest size tried of which 999 of 1000 impacts end within 1 ms, on this machine.",
+    note="The largest tried number of contacts with which 999 of 1000 impacts end within 1 ms, on this machine.",
 )  # fmt: skip
 KERNELS = replace(C22, key="compiled, IAPB and Lemke", says=_kernels_say)
 SOLVERS = replace(IMPACT_TIMES, key="solvers", says=solvers_say)
@@ -60,8 +60,8 @@ BENCH = Topic(
     key="haptic-rate", title="The haptic rate",
     question="A haptic loop must finish each step within a millisecond. This page compares the engine's times with "
     "those of MuJoCo, Pinocchio, the printed formula and complementarity solvers. The programs are timed in turns "
-    "within one run, because ratios depend less on the machine than seconds. Where the engine misses a target, the "
-    "parts of its step show where the time is spent.",
+    "within one run, because ratios of times depend less on the machine than times. If the engine misses a target, the "
+    "table of the parts of a step shows where the time is spent.",
     checks=(RACES, PROFILE, SCALING, KERNELS, SOLVERS, FITTED, RATE, BODIES, ROBOTS, START, MOTIONS, WORTH, BUDGET_ROWS,
             ORDER_BIAS), says=_answer,
 )  # fmt: skip

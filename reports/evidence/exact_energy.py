@@ -22,8 +22,8 @@ from verification.table import HOLDS, Row, Table
 _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
 _SLOW = ("subnormal velocities",)  # takes 2 ms an impact, the others some µs: a quarter of the impacts
 FEW = 100  # runs that are certified in this process, which is faster than to start others
-_NOTE = ("Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: impacts without any passive step, so v⁺ = v⁻. Energy "
-         "cost: the loss at e = 1 beyond that of the same impact without clamp, in units of 10 d ε √κ(M).")
+_NOTE = ("Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: impacts for which no step was passive, so that v⁺ = v⁻. "
+         "Energy cost: the extra loss at e = 1, compared with the same impact without clamp, in units of 10 d ε √κ(M).")
 
 
 def _certified(study: Study, name: str) -> list[Row]:
@@ -84,22 +84,21 @@ def _recorded_says(table: Table) -> Part:
     gains, impacts = _sums(table)
     return Part(f"Judged in exact arithmetic, {gains or 'none'} of {impacts:,} impacts in {len(table.rows):,} runs of "
                 "the engine gained energy", "", quantities=(("impacts certified", f"{impacts:,}"),), target="none",
-                asked="Impacts of all runs that gain energy", measured=f"{gains or 'none'} of {impacts:,}")
+                asked="Impacts that gain energy, in all runs", measured=f"{gains or 'none'} of {impacts:,}")
 
 
 def _drawn_says(table: Table) -> Part:
     least = min(table.column("moved"), default=0.0)
     return Part(f"{_adverse(table)}; in every family the impact changed the velocity in at least {least:.1%} of the "
                 "cases", "", quantities=(("adverse impacts certified", f"{_sums(table)[1]:,}"),), target="none",
-                asked="Random impacts drawn to provoke a gain, and that gain energy",
+                asked="Random impacts, drawn to provoke a gain, that gain energy",
                 measured="{} of {:,}; in every family the impact changed the velocity in at least {:.1%} of the cases"
                 .format(*_sums(table), least))  # fmt: skip
 
 
 def _adverse(table: Table) -> str:
     gains, impacts = _sums(table)
-    drawn = f"{impacts:,} random impacts drawn to provoke a gain"
-    return f"{gains} of {drawn} did" if gains else f"nor did {drawn}"
+    return f"Of {impacts:,} random impacts drawn to provoke a gain, {gains or 'none'} gained energy"
 
 
 def _sums(table: Table) -> tuple[int, int]:
@@ -108,7 +107,7 @@ def _sums(table: Table) -> tuple[int, int]:
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:
     recorded, drawn = parts
-    return Part(f"{recorded.sentence}; {_adverse(tables['adverse impacts'])}.", "",
+    return Part(f"{recorded.sentence}. {_adverse(tables['adverse impacts'])}.", "",
                 quantities=(*recorded.quantities, *drawn.quantities))  # fmt: skip
 
 

@@ -108,12 +108,12 @@ def _lost_on(name: str, kernels: Table) -> str:
     if not slower:
         return f"On {name} IAPB is never clearly slower. "
     worst = 1.0 / min(row["ratio"] for row in slower)
-    return f"On {name} it is up to {worst:.2g} times slower, clearly at {len(slower)} of {len(kernels.rows)} sizes. "
+    return f"On {name} IAPB is up to {worst:.2g} times slower, clearly at {len(slower)} of {len(kernels.rows)} sizes. "
 
 
 def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
     """Return a table of the fastest rival by number of contacts, compiled and called from Python, and its text."""
-    heads = {accuracy.COMPILED: "fastest compiled", accuracy.PYTHON: "fastest called from Python"}
+    heads = {accuracy.COMPILED: "fastest compiled method", accuracy.PYTHON: "fastest method from Python"}
     lines: dict[str, list[str]] = {}
     for called in heads:
         lost = accuracy.lost_to_rivals(numbers, called)
@@ -122,7 +122,7 @@ def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
             best = max(here.records(), key=lambda row: float(row["ratio"]), default=None)
             told = "IAPB" if best is None else (
                 f"{best['solver']}: up to {best['ratio']:.2g} times faster, on {len(set(here.column('problem')))} of "
-                f"{len(cases)}")
+                f"{len(cases)} impacts")
             lines.setdefault(_contacts({"contacts": c}), []).append(told)
     words = "; ".join(f"{size}: " + ", ".join(map("{}: {}".format, heads.values(), said))
                       for size, said in lines.items())  # fmt: skip

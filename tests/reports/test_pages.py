@@ -170,7 +170,7 @@ def test_hard_cases_are_seen_at_a_glance_and_a_refusal_or_an_empty_table_is_no_n
     stable = hard_case(("IAPB", "stable", 0.0))
     found = on_hard_cases((stable, hard_case(("IAPB", "gains energy", 0.5), title="stiff wall")))
     assert found.verdict == MIXED and "1 of 2" in found.answer and "stiff wall (gains energy)" in found.answer
-    assert "1 were skipped" in on_hard_cases((stable, skipped)).answer
+    assert "1 cases were skipped" in on_hard_cases((stable, skipped)).answer
 
 
 @pytest.mark.parametrize(("text", "shown"), [

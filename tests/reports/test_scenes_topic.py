@@ -50,7 +50,7 @@ def test_sentences_say_the_numbers(topic: Finding) -> None:
     assert f"{deepest['most penetration']:.2f} mm ({deepest['scene']})" in topic.parts[0].sentence
     assert all(part.sentence.endswith(".") for part in topic.parts)
     assert {part.verdict for part in topic.parts} <= {REPRODUCED, MIXED}
-    assert "4 scenes, 3 of them in space" in topic.answer
+    assert "4 scenes, 3 of them three-dimensional" in topic.answer
 
 
 def test_worse_records_are_judged_worse(runs: tuple[Run, ...]) -> None:

@@ -38,7 +38,8 @@ def test_a_case_that_raises_costs_its_row_alone():
     found = concluded(a_check())
     assert found.tables["sizes"].rows == (("a", 1), ("bb", 2)) and found.verdict == NOT_COMPUTED
     assert [(one.case, one.error) for one in found.failures] == [("sizes, broken", "ZeroDivisionError")]
-    assert found.parts[0].sentence == "Cases are short. 2 of 2 rows hold." and found.parts[0].verdict == REPRODUCED
+    assert (found.parts[0].sentence, found.parts[0].verdict) == ("Cases are short. 2 of 2 rows of the table hold.",
+                                                                 REPRODUCED)  # fmt: skip
     assert found.answer == "All said. 1 case failed."
 
 

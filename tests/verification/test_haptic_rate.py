@@ -110,13 +110,13 @@ def _found(tables: Tables) -> Finding:
 def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
     found = _found(tables)
     assert {part.verdict for part in found.parts} == {found.verdict} == {REPRODUCED}
-    assert f"{len(found.parts)} of {len(found.parts)} of our own speed targets met" in found.answer and found.timed
+    assert f"{len(found.parts)} of {len(found.parts)} of our own speed targets are met" in found.answer and found.timed
 
 
 @pytest.mark.parametrize(
     ("change", "number"),
     [
-        ({RACES.key: _races(0.4)}, "0.4 times MuJoCo's time"),
+        ({RACES.key: _races(0.4)}, "0.4 times as long as MuJoCo's"),
         ({SCALING.key: _times(5.0)}, "takes 5 times"),
         ({SOLVERS.key: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-5))}, "daqp on the patch at 4 contacts"),
         ({KERNELS.key: _kernels(2.0, 0.5, 1.0)}, "faster than Lemke's method in 1 of the 2 impacts"),
@@ -124,7 +124,7 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
         ({BODIES.key: _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2"),
         ({BODIES.key: _bodies(20, 200, step=float, tested=lambda n: n * n)}, "tested pairs"),
         ({ORDER_BIAS.key: _bias(14.0)}, "IAPB by 14 %"),
-        ({BUDGET_ROWS.key: BUDGET_ROWS.table_of([_budget(2, gain=1e-16)])}, "gains energy in 1 of 1"),
+        ({BUDGET_ROWS.key: BUDGET_ROWS.table_of([_budget(2, gain=1e-16)])}, "adds energy in 1 of 1"),
     ],
 )
 def test_a_miss_is_called_one(tables: Tables, change: Tables, number: str) -> None:

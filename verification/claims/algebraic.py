@@ -158,9 +158,9 @@ def losses(key: str, question: str, place: str, families: Sequence[Family], impa
         exact=([family for family in families if family.condition_number == families[0].condition_number], 0.5),
         roles={AS_PRINTED: MISPRINT},
         says=f"The relative energy gain is {{{PASSIVE}}}. The last line of the paper's own derivation (32) loses a "
-        f"factor ½, so the form as printed ({place}) is twice the loss. With the factor ½, the difference between loss "
-        f"and form is {{{WITH_HALF}}}; as printed, it is {{{AS_PRINTED}}}. With the factor and in rational arithmetic, "
-        f"it is {{{EXACT_LOSS}}}.",
+        f"factor ½, so the printed form ({place}) is twice the loss. With the factor ½, the difference between loss "
+        f"and form is {{{WITH_HALF}}}; as printed, it is {{{AS_PRINTED}}}. With the factor, in rational arithmetic, it "
+        f"is {{{EXACT_LOSS}}}.",
     )  # fmt: skip
 
 
@@ -257,8 +257,7 @@ C03 = batches(
     },
     says="In rational arithmetic, the number of states that differ is {pseudo-inverse, in rationals}; with another "
     "choice of independent rows, it is {other independent rows, in rationals}. In doubles, the relative difference of "
-    "the printed formula is {pseudo-inverse, in doubles}; that of the factored form is {orthonormal basis, in "
-    "doubles}.",
+    "the printed formula is {pseudo-inverse, in doubles}; that of the factored form {orthonormal basis, in doubles}.",
 )  # fmt: skip
 
 
@@ -278,8 +277,8 @@ C04 = batches(
            "in rationals": Measure(lambda batch: worst(
                float(abs(impact.energy_after - impact.energy_before))
                for impact in (exact_impact(*case.arrays, 1) for case in batch.impacts)))},
-    says="In doubles, the relative change of energy is {in doubles}. In rational arithmetic, the change of energy [J] "
-    "is {in rationals}.",
+    says="In doubles, the relative change of energy is {in doubles}. In rational arithmetic, the change [J] is "
+         "{in rationals}.",
 )  # fmt: skip
 
 
@@ -305,8 +304,8 @@ C05 = batches(
     families=[Family(d, 1, 1, k) for d in (1, 3, 12) for k in (1e1, 1e3, 1e5)],
     restitutions=(0.0, 0.3, 1.0), impacts={"quick": 8, "full": 100},
     parts={f"LCP by {solver}": _from_lcp(solver) for solver in ("daqp", "lemke")},
-    says="The relative difference from the impulse of the LCP solver daqp is {LCP by daqp}; from that of the LCP "
-    "solver lemke it is {LCP by lemke}.",
+    says="The relative difference from the impulse of the LCP solver daqp is {LCP by daqp}; from that of lemke it is "
+         "{LCP by lemke}.",
 )  # fmt: skip
 
 

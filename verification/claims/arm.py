@@ -74,8 +74,7 @@ C07 = Check(
     key="C07", question="A plastic collision takes all or part of the kinetic energy, depending on the geometry.",
     place="Section V-A, Fig. 2 and 3",
     quantity="Share of kinetic energy lost by the two-link arm in one frictionless collision with e = 0.",
-    tolerance="“All” means all of the energy to within 1e-12 of it, the rounding of one 2 x 2 factorization; “part” "
-    "means less.",
+    tolerance="“All”: all of the energy to within 1e-12 of it, the rounding of one 2 x 2 factorization. “Part”: less.",
     cases=lambda study: [case for case in product((RODS, POINTS), ANGLES, PLACES) if case != (POINTS, 0.0, 1.0)],
     row=_struck, holds=_holds, says=_says, parts=["reading"],
     conditions=["place along the second link", "angle of the second link"],

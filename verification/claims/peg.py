@@ -166,8 +166,8 @@ def small_tilts(table: Table) -> set[float]:
 
 def _trajectory_says(table: Table) -> str:
     def counts(tilts: Iterable[float]) -> str:
-        return ", ".join(f"{held} of {decided} in {NAMED[name]}"
-                         for name, (held, decided) in closest_at(table, tilts).items())
+        found = closest_at(table, tilts)
+        return ", ".join(f"{held} of {told} in {NAMED[name]}" for name, (held, told) in found.items())
 
     papers = table.only(part in NAMED for part in table["part"])
     return (
@@ -247,11 +247,9 @@ C11 = peg_claim(
     "C11", "Forces are large on new contact, only balance the hand while in contact, and are closest to ideal.",
     place="Section VI, Fig. 8",
     quantity="Peak force of the device's actuators; their mean force after settling; mean of |F − F_ideal| over the "
-    "steps. Beyond the paper: the RMS of F − F_ideal, which grows without limit as the step Δt shrinks, because it "
-    "squares p/Δt.",
+    "steps. Beyond the paper: the RMS of F − F_ideal, which grows without limit as the step Δt shrinks.",
     tolerance="Peak: larger than PB's. Mean force: within 0.05 N of the hand force; 0.05 N is the damper's force at "
-    "the largest speed that counts as settled. Distance: strictly the smallest. A trial cannot tell if all values are "
-    "below 1e-9.",
+    "the largest speed that counts as settled. Distance: the smallest. A trial cannot tell if all are below 1e-9.",
     row=_forces, holds=_forces_hold, says=_forces_say, parts=("part", "coordinate"), axes=("tilt", "clearance", "part"),
     roles={CLOSEST_RMS: BEYOND},
 )  # fmt: skip
@@ -372,10 +370,9 @@ def _limited_forces_say(table: Table) -> str:
 C14 = peg_claim(
     "C14", "Impulses kept within the device's limits still exceed the penalty forces felt on contact.",
     limited=True, place="Section VI, Fig. 11",
-    quantity="Peak force of the device's actuators over the run, per coordinate: of IAPB with spread impulses, and of "
-             "PB.",
-    tolerance="IAPB's peak is strictly larger. A trial cannot tell if neither peak reaches a hundredth of the smallest "
-    "force that a fingertip feels.",
+    quantity="Peak force of the device's actuators in the run, per coordinate: IAPB with spread impulses, and PB.",
+    tolerance="IAPB's peak is strictly larger. A trial cannot tell if neither peak reaches a hundredth of the least "
+    "force that can be felt.",
     row=_limited_forces, holds=_limited_forces_hold, says=_limited_forces_say, parts=("coordinate",),
     axes=("tilt", "force_limit", "coordinate"),
 )  # fmt: skip
@@ -432,8 +429,7 @@ C15 = peg_claim(
     quantity="How often a corner of the device's peg leaves a wall by more than 10 µm after touching it; time from "
     "the first contact until the device stays below 1 mm/s and 0.01 rad/s.",
     tolerance="Strictly fewer bounces, and strictly sooner: a tie fails. A separate part tests whether IAPB bounces at "
-    "most as often. A trial cannot tell about bounces if neither world has any, nor about settling if the peg settles "
-    "in neither.",
+    "most as often. A trial cannot tell if the peg bounces (or settles) in neither world.",
     row=_settling, holds=_settling_holds, says=_settling_says, parts=("part",), conditions=(*START, "rendering"),
     named={FEWER: "bounces", NO_MORE: "bounces", SETTLES: "settling time"},
     axes=("tilt", "clearance", "part"),

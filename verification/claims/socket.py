@@ -106,8 +106,8 @@ C18 = Check(
     key="C18", question="Clustering and temporal coherence remove false collisions.", place="Section III",
     quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. The "
     "facets approximate a round socket, in which a rolling ball does not collide again; so each collision is false.",
-    tolerance="No false collision remains. The paper requires a coherence distance above speed × step; a trial without "
-    "such a distance cannot tell.",
+    tolerance="No false collision remains. The paper requires a coherence distance above speed × step; a trial with "
+    "less cannot tell.",
     cases=_cases, row=_row, holds=_holds, says=_says, draw=_draw, parts=["part"],
     roles={CLUSTERING: BEYOND}, named={SHORT: "coherence distances short of the next facet"},
     conditions=["cluster_distance", "coherence_distance", "damping", "rate"],

@@ -74,10 +74,10 @@ def _losses_say(table: Table) -> str:
         total = [1e3 * pick(every.column("lost")) for pick in (min, max)]
         penalty = [1e3 * pick(first.column("PB, lost within 20 ms")) for pick in (min, max)]
         texts.append(
-            f"At a tilt of {tilt:g} rad the first impact takes {1e3 * reference:.4g} mJ; between the walls this varies "
-            f"by {np.ptp(losses) / reference:.0e} of it. All impacts of a run together take {total[0]:.3g} to "
-            f"{total[1]:.3g} mJ, depending on the wall. PB takes {penalty[0]:.2g} to {penalty[1]:.3g} mJ in the first "
-            "20 ms of contact."
+            f"At a tilt of {tilt:g} rad the first impact takes {1e3 * reference:.4g} mJ; it varies by "
+            f"{np.ptp(losses) / reference:.0e} of this between walls. All impacts of a run together take "
+            f"{total[0]:.3g} to {total[1]:.3g} mJ, depending on the wall. PB takes {penalty[0]:.2g} to "
+            f"{penalty[1]:.3g} mJ in 20 ms from contact on."
         )
     return (f"{' '.join(texts)} The claim is about one collision. The sum over all impacts goes beyond the claim, "
             "because later impacts start from states that the walls have changed.")

@@ -179,23 +179,24 @@ def _map_says(table: Table) -> Iterator[Part]:
     yield Part.of(
         "With equal e the two laws agree if and only if some p >= 0 gives IAPB's velocity",
         f"{sum(table['contradictions'])} of {sum(table['cases'])} impacts contradict this. Where the laws differ, "
-        f"IAPB loses ½ (1−e)/(1+e) · distance² more (to {max(table['defect']):.0e}), at most "
-        f"{max(table['largest extra loss of KE⁻']):.0%} of KE⁻", "no contradiction", "", "statements")  # fmt: skip
+        "IAPB loses more energy than the LCP, by ½ (1−e)/(1+e) times the square of the distance (correct to "
+        f"{max(table['defect']):.0e}). The extra loss is at most {max(table['largest extra loss of KE⁻']):.0%} of KE⁻",
+        "no contradiction", "", "statements")
     if scenes := [row for row in rows if row["impacts"].startswith("scene ")]:
         apart = sorted({row["impacts"].removeprefix("scene ") for row in scenes if row["share that agrees"] < 1.0})
         pulling = sum(round(row["share that truly pulls"] * row["cases"]) for row in scenes)
         yield Part.of(
             f"Impacts of the project's scenes, each run with its own e and with e = {SCENE_RESTITUTIONS[1]:g}",
-            f"{pulling} of {sum(row['cases'] for row in scenes)} need a pulling impulse (no p >= 0 gives their "
-            f"velocity). The laws {'differ in ' + ', '.join(apart) if apart else 'agree in all'}",
+            f"{pulling} of {sum(row['cases'] for row in scenes)} impacts need a pulling impulse, because no p >= 0 "
+            f"gives the velocity of (21). The laws {'differ in ' + ', '.join(apart) if apart else 'agree in all'}",
             "the laws agree in all scenes", MIXED if apart else REPRODUCED, "scenes")  # fmt: skip
     beside = table.where(impacts="with a neighbour")
     if beside.rows:
         ours, theirs = (float(np.mean(beside[f"left approaching by {law}"])) for law in ("IAPB", "the LCP"))
         yield Part.of(
-            "A neighbouring contact that touches without approaching has no row in (19): it approaches afterwards",
-            f"in {100 * ours:.0f} % of such impacts with IAPB, and in {100 * theirs:.0f} % with the LCP on the same "
-            "rows", "never", verdict_of_share(1.0 - ours), "touching")  # fmt: skip
+            "A neighbouring contact that touches but does not approach has no row in (19). How often does it approach "
+            "after the impact?", f"in {100 * ours:.0f} % of such impacts with IAPB, and in {100 * theirs:.0f} % with "
+            "the LCP on the same rows", "never", verdict_of_share(1.0 - ours), "touching")  # fmt: skip
 
 
 MAP = Check(
@@ -204,10 +205,10 @@ MAP = Check(
     row=_compared, holds=lambda row: row["contradictions"] == 0 and row["defect"] <= PUSHED
     and row["momentum outside range(Jᵀ)"] <= MOMENTUM,
     says=_map_says, digits=3,
-    note="IAPB and the Newton LCP; distances in the kinetic metric, relative to |v⁻|. An impact truly pulls where no "
-    "p >= 0 gives its velocity; it pulls as chosen where only the least-norm p does. Left approaching: share of "
-    "impacts after which some contact approaches, touching contacts without a row included. Defect: error of the "
-    "statement on distance and energy. Impacts with per-body rows, friction or device limits are left out.",
+    note="IAPB and the Newton LCP; distances are in the kinetic metric, relative to |v⁻|. An impact truly pulls if no "
+    "p >= 0 gives its velocity; it pulls as chosen if another p >= 0 would, but the least-norm p pulls. Left "
+    "approaching: share of impacts after which some contact approaches, even a touching one without a row. Defect: "
+    "error of the statement on distance and energy. Without impacts with per-body rows, friction or device limits.",
 )  # fmt: skip
 
 
@@ -229,7 +230,7 @@ def _two_contacts(study: Study, point: tuple[float, float, ImpactCase]) -> Row:
 
 
 TWO_CONTACTS = Check(
-    key="two contacts", question="Two contacts with approach speeds 1 and r, whose rows have the cosine c in the "
-    "kinetic metric: the laws agree exactly where r >= c.",
+    key="two contacts", question="For two contacts with approach speeds 1 and r, whose rows have the cosine c in the "
+    "kinetic metric, the laws agree exactly where r >= c.",
     cases=_grid, row=_two_contacts, holds=lambda row: row["agreement predicted"] == row["agreement found"], digits=3,
 )  # fmt: skip

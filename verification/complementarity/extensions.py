@@ -117,9 +117,9 @@ def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | 
 
 
 FRICTION = Check(
-    key="friction", question="Impacts with dry friction: where every contact pushes, IAPB's velocity equals that of "
-    "Coulomb's law (nonlinear complementarity problem, NCP), and IAPB never gains energy; with e > 0 the NCP and "
-    "its convex relaxation (CCP) may.",
+    key="friction", question="In impacts with dry friction, IAPB never adds energy. Where every contact pushes, its "
+    "velocity equals that of Coulomb's law (a nonlinear complementarity problem, NCP). With e > 0 the NCP and its "
+    "convex relaxation (CCP) may add energy.",
     cases=lambda study: product(RESTITUTIONS, FRICTIONS), row=with_friction, rule=verdict_of_trials, digits=2,
     holds=lambda row: bool(row["share equal to the NCP"] == row["all contacts push"]
                            and row["largest change of KE, IAPB"] <= GAIN),
@@ -145,8 +145,8 @@ def with_unequal(study: Study, signs: str, seed: int = 45) -> Row:
 
 
 UNEQUAL = Check(
-    key="unequal restitution", question="Unequal restitution: the engine gives the velocity of Poisson's law and never "
-    "gains energy; plain equalities may, and the Newton LCP where some contacts separate.",
+    key="unequal restitution", question="With unequal restitution, the engine gives the velocity of Poisson's law and "
+    "never adds energy. Plain equalities may add energy, and so may the Newton LCP if some contacts separate.",
     cases=lambda study: ("all approach", "mixed signs"), row=with_unequal, digits=2,
     holds=lambda row: bool(row["distance from Poisson's law"] <= SAME_LAW
                            and row["largest change of KE, IAPB"] <= GAIN),

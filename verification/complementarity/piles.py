@@ -140,13 +140,13 @@ def _says(table: Table) -> Part:
     pulling = 100.0 * float(np.average([row["share of impulses that pull"] for row in beyond],
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
     return Part.of(
-        "Dense piles, with every colliding contact as an equality (19): impulses that push can produce the velocity",
-        f"in {agree:.0f} of {piles} impacts. The largest of these has {limit} contacts; this is no safe limit, since "
-        f"many smaller ones fail. Beyond {limit} contacts, {pulling:.0f} % of the impulses pull. With impulses that "
-        "only push (method \"poisson\", world IAPB-push) the velocity equals the LCP's to "
-        f"{max(table['pushing from the LCP']):.0e}", "in all impacts",
+        "In dense piles with every colliding contact as an equality (19), can impulses that push produce the velocity?",
+        f"in {agree:.0f} of {piles} impacts. The largest of these has {limit} contacts, which is no safe limit, "
+        f"because many smaller impacts fail. In impacts with more than {limit} contacts, {pulling:.0f} % of the "
+        "impulses pull. If impulses may only push (method \"poisson\", world IAPB-push), the velocity equals that of "
+        f"the LCP to {max(table['pushing from the LCP']):.0e}", "in all impacts",
         verdict_of_share(agree / piles), "piles",
-        miss=f"in impacts with more than {limit} contacts, {pulling:.0f} % of the impulses pull")  # fmt: skip
+        miss=f"in piles with more than {limit} contacts at once, {pulling:.0f} % of IAPB's impulses pull")  # fmt: skip
 
 
 def piles(folders: Iterable[Path | str]) -> Check:
@@ -154,7 +154,7 @@ def piles(folders: Iterable[Path | str]) -> Check:
     return Check(
         key="piles", question="", cases=lambda study: groups_of(study.depth, folders), row=group_rows, says=_says,
         timed=TIMES, digits=3,
-        note="(21) with every row as an equality, beside impulses that only push (method \"poisson\"); e = 0; "
-        "distances in the kinetic metric, relative to |v⁻|. Agrees: some p >= 0 gives the velocity of (21). Times are "
-        "of calls from Python, checks included.",
+        note="The table compares (21), with every row as an equality, and impulses that only push (method "
+        "\"poisson\"), at e = 0. Distances are in the kinetic metric, relative to |v⁻|. A pile agrees if some p >= 0 "
+        "gives the velocity of (21). Times are those of calls from Python, with checks of the arguments.",
     )  # fmt: skip

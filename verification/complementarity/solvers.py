@@ -133,7 +133,7 @@ def collections(folders: Mapping[str, Path | None]) -> tuple[Check, ...]:
 
 def _collection(name: str, folder: Path | None) -> Check:
     return Check(
-        key=name, question=f"{name[:1].upper()}{name[1:]}: some solver solves every problem, by recomputed residuals.",
+        key=name, question=f"{name[:1].upper()}{name[1:]}: a solver solves each problem, by recomputed residuals.",
         cases=lambda study: on_problems(study, name, folder).lines, row=lambda study, line: line,
         holds=lambda row: "solved" in row.values(), rule=verdict_of_trials, timed=["spread of velocities"], digits=2,
         note="Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. Spread: "

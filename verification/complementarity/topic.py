@@ -39,7 +39,7 @@ def complementarity(folders: Mapping[str, Path], worlds: Iterable[str] = ()) -> 
         key="complementarity", title="Against complementarity",
         question="IAPB solves (21): every colliding contact separates with e times its approach velocity, and impulses "
         "may pull. A linear complementarity problem (LCP) allows only pushing impulses and decides which contacts "
-        "push. Both laws are applied to the same impacts: random families of known geometry, every impact of the "
+        "push. Both laws are applied to the same impacts: random impacts of known geometry, every impact of the "
         "project's scenes, and problems that solvers find hard. A solution counts only if its residuals, recomputed "
         "from the problem, are small. Velocities after the impact are compared in the kinetic metric, relative to "
         "|v⁻|.",
@@ -55,20 +55,19 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     cases = sum(found["cases"]) or 1
     agree = sum(row["share that agrees"] * row["cases"] for row in found.records()) / cases
     held = sum(part.verdict == REPRODUCED for part in parts)
-    return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree if and "
-            "only if pushing impulses (p >= 0) can produce IAPB's velocity: "
-            f"{sum(found['contradictions']) or 'no'} exceptions. {held} of {len(parts)} findings are "
-            "reproduced without restriction.")
+    return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree if and only "
+            f"if pushing impulses (p >= 0) can produce IAPB's velocity: {sum(found['contradictions']) or 'no'} "
+            f"exceptions were found. {held} of the {len(parts)} findings hold in full.")
 
 
 REFERENCES = Check(
-    key="references", question="The references compute M and B + G with Pinocchio and contacts in closed form; the "
-    "engine's agree to 1e-12.",
+    key="references", question="The engine's M, B + G and contacts agree to 1e-12 with references: Pinocchio for M "
+    "and B + G, closed forms for contacts.",
     cases=lambda study: scene_names(), digits=2,
     row=lambda study, name: scene_difference(load_scene(find_scene(name)), CONFIGURATIONS),
     holds=lambda row: max(row["M"], row["B + G"], row["gap"]) <= SAME_MECHANICS,
-    note="Largest differences between engine and reference: relative to the largest entry for M, B + G and Jacobians, "
-    "absolute for contacts. Contacts differ, for example, where two faces are equally deep.",
+    note="Largest differences between engine and reference. For M, B + G and Jacobians they are relative to the "
+    "largest entry; for contacts they are absolute. Contacts differ, for example, where two faces are equally deep.",
 )  # fmt: skip
 
 

@@ -418,13 +418,13 @@ def _budgets_say(table: Table) -> Part:
     half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
     return target(
         "An impact that stops early, after a budget of rows (computed exactly)",
-        f"gains energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows already take "
-        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "no gain",
+        f"adds energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows already take "
+        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "never adds energy",
         gains == 0, timed=False)  # fmt: skip
 
 
 BUDGET_ROWS = Check(
     key="budgets", question="What does an impact give that stops early?", row=stopped, says=_budgets_say, digits=3,
     cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
-    note="Residual: max |J v⁺ + e J v⁻| in the kinetic metric, of |v⁻|.",
+    note="Residual: max |J v⁺ + e J v⁻| in the kinetic metric, relative to |v⁻|.",
 )  # fmt: skip

@@ -99,15 +99,15 @@ def _growth_says(table: Table) -> Part:
 SCALING = Check(
     key="scaling", question="How does the time of an impact grow with its size?", cases=lambda _: (SIZES,),
     row=scaling, says=_scaling_says, timed=TIMES, digits=3,
-    note="Random impacts with rows of rank two thirds of d. The nine hard impacts of a size (Accuracy against time) "
-    "have other ranks, and other times.",
+    note="Random impacts; the rank of the rows is two thirds of the number d of coordinates. The nine hard impacts of "
+    "a size (page Accuracy against time) have other ranks, and other times.",
 )  # fmt: skip
 FITTED = Check(
     key="fitted", question="With which power does it grow?", says=_growth_says, digits=3,
     cases=lambda _: [(method, axis) for method in (FACTORED, PRINTED) for axis in ("contacts", "coordinates")],
     row=lambda study, case: fitted(study.table(SCALING), *case), timed=("exponent", "steepest from", "to", "there"),
-    note="Least squares of log time over log size; there: the exponent between the two neighbouring sizes where it is "
-    "largest.",
+    note="The exponent is a least-squares fit of log time over log size. Steepest: the two neighbouring sizes between "
+    "which the exponent is largest; “there” is this exponent.",
 )  # fmt: skip
 
 

@@ -62,8 +62,8 @@ def _robots_say(table: Table) -> Iterator[Part]:
             continue
         worst = max(rows, key=lambda row: float(row["ratio"]))
         yield limited(f"the {worst['quantity']} of {worst['robot']}, {form}, takes", worst["ratio"], limit,
-                      " times Pinocchio's time",
-                      f", the most of {len({row['robot'] for row in rows})} robots ({table.note})")  # fmt: skip
+                      " times as long as Pinocchio's",
+                      f", the largest ratio of {len({row['robot'] for row in rows})} robots ({table.note})")
 
 
 ROBOTS = Check(

@@ -99,7 +99,7 @@ def solvers_say(table: Table) -> Part:
         slower.setdefault(f"{row['solver']} on the {row['impacts']}", []).append(row["contacts"])
     where = ", ".join(f"{name} at {' to '.join(map(str, sorted({min(found), max(found)})))} contacts"
                       for name, found in slower.items())
-    return faster("from Python", "a solver", "pairs of solver and size", [more for _, more in pairs],
+    return faster("called from Python", "the solver", "pairs of solver and size", [more for _, more in pairs],
                   where and f"than {where}")
 
 
@@ -110,10 +110,10 @@ def faster(how: str, rival: str, what: str, outcomes: Sequence[bool | None], whe
         return Part(f"Time of one impact {how}: nothing was timed that differs clearly from IAPB.", NOT_COMPUTED,
                     timed=True)
     return target(
-        f"One impact, from M, J and v to v⁺ at the same accuracy, {how} on both sides",
-        f"IAPB is faster than {rival} in {count - slower} of the {count} {what} whose times differ clearly "
-        f"({len(outcomes) - count} do not){where and f'; slower {where}'}", "faster in all", not slower,
-        f"{how}, IAPB is slower than {rival} in {slower} of {count} {what}")  # fmt: skip
+        f"Time of one impact, from M, J and v to v⁺ at the same accuracy; both methods {how}",
+        f"IAPB is faster than {rival} in {count - slower} of the {count} {what} whose times differ clearly (in "
+        f"{len(outcomes) - count} more they do not){where and f'. IAPB is slower {where}'}", "faster in all",
+        not slower, f"with both methods {how}, IAPB is slower than {rival} in {slower} of {count} {what}")
 
 
 MEASURED = ("median [µs]", "least [µs]", "largest [µs]")

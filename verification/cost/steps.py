@@ -107,9 +107,10 @@ def _races_say(races: Table) -> Iterator[Part]:
         fastest.setdefault((row["scene"], row["MuJoCo's form"]), row)
     for scene in dict.fromkeys(races.column("scene") if races.rows else ()):
         worst = max((row for (name, _), row in fastest.items() if name == scene), key=lambda row: float(row["ratio"]))
-        yield limited(f"a recorded step of the {scene}, at rest, takes", worst["ratio"], worst["target"],
-                      " times MuJoCo's time", " ({MuJoCo's form}, {MuJoCo's contacts:.0f} contacts, solver "
-                      "{MuJoCo's solver}; {iapb's contacts:.0f} contacts of ours)".format_map(worst))  # fmt: skip
+        yield limited(f"with the {scene} at rest, a recorded step takes", worst["ratio"], worst["target"],
+                      " times as long as MuJoCo's", " (MuJoCo: {MuJoCo's form}, {MuJoCo's contacts:.0f} contacts, "
+                      "solver {MuJoCo's solver}; engine: {iapb's contacts:.0f} "
+                      "contacts)".format_map(worst))  # fmt: skip
 
 
 class OwnLoop:
@@ -170,9 +171,8 @@ RACES = Check(
     cases=lambda _: RESTING if find_spec("mujoco") else (), digits=3,
     timed=("MuJoCo's step", "ratio", "quartiles", "iapb's drift", "MuJoCo's drift"),
     note="Frictionless (condim 1), with the same masses, forces and step; MuJoCo's other options have default values. "
-    "The engine's steps are recorded, MuJoCo's are not. Ratios are computed for each round of timing; median and "
-    "quartiles are given. Contacts are means over the timed steps. Moved: largest change of a coordinate while timed, "
-    "m or rad.",
+    "The engine records its steps; MuJoCo does not. Each round of timing gives a ratio; the table has their median and "
+    "quartiles. Contacts are means over the timed steps. Drift: largest change of a coordinate while timed, m or rad.",
 )  # fmt: skip
 
 
@@ -220,7 +220,7 @@ def profile(study: Study, name: str) -> list[Row]:
 
 PROFILE = Check(
     key="parts of a step", question="Where does the time of a step go?", row=profile, timed=TIMES, digits=3,
-    cases=lambda _: RESTING, note="Each part repeated by itself in compiled code.",
+    cases=lambda _: RESTING, note="Each part is repeated on its own in compiled code.",
 )  # fmt: skip
 
 
@@ -282,8 +282,9 @@ def _bodies_say(table: Table) -> Iterator[Part]:
     power, more = power_law(bodies, times), ""
     if len(rows) > 2:
         low, high, slope = steepest(bodies, times)
-        more = f"; it grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}"
-    yield limited(f"from {LEAST_BODIES} free bodies on the time of a step grows as their number to the power", power,
+        more = f"; the time grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}"
+    yield limited(f"from {LEAST_BODIES} free bodies on, the time of a step grows as the number of bodies to the "
+                  "power", power,
                   LARGEST_POWER, "", more, quantities=(("exponent of bodies", f"{power:.3g}"),))  # fmt: skip
     last = rows[-1]
     yield limited("the tested pairs of shapes grow as the number of bodies to the power", power_law(bodies, pairs),

@@ -433,10 +433,10 @@ def _motions_say(motions: Table) -> Iterator[Part]:
         text = ", ".join(f"{name} {_error(run)} ({run['time']:.3g} ms)"
                          for name, run in best.items())
         more = f"; IAPB reaches MuJoCo's smallest error in {as_good:.3g} ms" if as_good < inf else ""
-        yield target(f"Whole motion, {scene}: smallest position error in body lengths (time per simulated second)",
-                     f"{text}{more}",
-                     "none more exact, and MuJoCo's error in less time", exact and fast,
-                     f"on the whole motion of {scene} " + (
+        yield target(f"Whole motion ({scene}): smallest position error in body lengths, with the computing time per "
+                     "simulated second", f"{text}{more}",
+                     "no method is more exact, and MuJoCo's error is reached in less time", exact and fast,
+                     f"in the whole motion “{scene}” " + (
                          "another method is as exact in less time" if exact else
                          f"no time step makes IAPB as exact as {most} ({_error(ours)} against {_error(best[most])})"))
 
@@ -448,17 +448,17 @@ def _error(run: Row) -> str:
 MOTIONS = Check(
     key="motions", question="What does the accuracy of a whole motion cost?", cases=lambda _: TRAJECTORY_SCENES,
     row=motions_of, says=_motions_say, timed=("time", "outcome", "note"), digits=3,
-    note="Errors: position in the sup norm over samples a millisecond apart, relative to the body's length; energies "
-    "relative to the largest kinetic energy.",
+    note="Errors of position are in the sup norm over samples a millisecond apart, relative to the body's length. "
+    "Errors of energy are relative to the largest kinetic energy.",
 )  # fmt: skip
 WORTH = Check(
     key="worth", question="Which method is worth its time?", row=lambda _, row: row, digits=2,
     cases=lambda study: worth(study.table(MOTIONS), WORLDS).by_title(), timed=(
         "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
-    note="Errors of position; least error: median over the scenes. A cost is fitted to the runs on which the error "
-    f"falls by a factor of {GAINED:g} or more from one to the next, where these are at least {FIT_RUNS} runs and the "
-    f"error falls at least {FIT_FALL:g}-fold over them: it is never extrapolated. Best for "
-    f"its time: scenes in which no other run is both faster and more exact, among errors up to {USEFUL:g} lengths. "
-    "Energy made: the largest excess of the energy over its value at the start.",
+    note="Errors are those of position; the least error is the median over the scenes. A cost is fitted to runs along "
+    f"which the error falls by a factor of {GAINED:g} or more from one run to the next. A fit needs at least "
+    f"{FIT_RUNS} runs and a total fall of {FIT_FALL:g} times, and is never extrapolated. Best for its time: number of "
+    f"scenes in which no other run is both faster and more exact, among errors up to {USEFUL:g} lengths. Energy made: "
+    "the largest excess of the energy over its value at the start.",
 )  # fmt: skip

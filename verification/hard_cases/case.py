@@ -104,7 +104,7 @@ class FrictionalCase(HardCase):
 
     tangent: Floats = field(kw_only=True)
     friction: float = field(kw_only=True)
-    law = "Newton's law with Coulomb friction, reduced to no gain: rational arithmetic, the root by ball arithmetic"
+    law = "Newton's law with Coulomb friction, reduced until no energy is gained; rational and ball arithmetic"
 
     @property
     def all_rows(self) -> Exact:

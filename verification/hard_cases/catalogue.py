@@ -51,7 +51,7 @@ def _named(*cases: Callable[[], AnyCase] | str) -> dict[str, Callable[[], AnyCas
 HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     "no_contact": partial(numerical.contacts, 0, "No contact at all",
                           "empty matrices, which libraries treat differently", "nothing happens, and no error"),
-    "one_contact": partial(numerical.contacts, 1, "One contact", "it is not: every method must solve this case",
+    "one_contact": partial(numerical.contacts, 1, "One contact", "it is easy: every method must solve it",
                            "(19) to rounding"),
     "hundred_contacts": partial(numerical.contacts, 100, "100 contacts of rank three",
                                 "97 redundant rows, each exact in doubles",
@@ -81,7 +81,7 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         "an impulse stops the handle before the spring is compressed: the wall gives no energy"),
     "wall_far_beyond_the_bound": partial(
         motions.wall, 2000, "only the spring acts while the contact lasts, and one time step is as long as a bounce",
-        "impulses do not make a spring this stiff passive; only the rigid wall is"),
+        "impulses do not make so stiff a spring passive; a rigid wall is passive"),
     **_named(motions.wedged_peg_motion),
     "touching_cradle": partial(motions.cradle, 0.0, "touching exactly"),
     "touching_cradle_in_centimetres": partial(motions.cradle, 0.0, "touching but for rounding", 0.01),

@@ -28,14 +28,14 @@ _NOTES = {
     "impact": "Stable: gain at most 10 d ε √κ(M), restitution residual at most 1e-8, error at most the error allowed. "
               "The gain (KE⁺ − KE⁻)/KE⁻ is computed exactly. The error is |v⁺ − truth| / |v⁻| in the kinetic metric; "
               "allowed is 10 n ε √κ (√κ + κ(A)), n = max(c, d), with κ of M scaled to a unit diagonal. Smallest fault "
-              "seen: the smallest relative error which, planted in the impulse or velocity of the answer, makes the "
-              "verdict unstable. Time: median of a call.",
+              "seen: the smallest relative error that makes the verdict unstable when planted in the impulse or "
+              "velocity. Time: median of a call.",
     "motion": "Stable: no energy created, restitution residual at most 1e-8, error within the discretisation error of "
               "the step. Gain: the largest amount of energy created, relative to the energy at the start or the work "
-              "done on the scene. Error: distance from the exact law, relative to its answer. Restitution residual: of "
-              "the collisions, weighted by their impulses. Smallest fault seen: the smallest share which, added to or "
-              "taken from all displacements and changes of velocity, makes the verdict unstable. Time: median of a "
-              "step.",
+              "done on the scene. Error: distance from the exact law, relative to its answer. Restitution residual: "
+              "that of the collisions, weighted by their impulses. Smallest fault seen: the smallest share by which "
+              "all displacements and changes of velocity must be altered to make the verdict unstable. Time: median of "
+              "a step.",
 }  # fmt: skip
 
 
@@ -56,16 +56,17 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
     skipped = len(cases) - len(tried)
     stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
-    sentence = (f"The engine is stable on {stable[1]} hard cases whose answer is known."
-                + (f" It fails on: {'; '.join(failing)}." if failing else "")
-                + (f" {skipped} were skipped because their files are absent." if skipped else ""))  # fmt: skip
+    sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer and adds no energy."
+                + (f" It fails in: {'; '.join(failing)}." if failing else "")
+                + (f" {skipped} cases were skipped because their files are absent." if skipped else ""))  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
     question = "Is the engine stable on problems on which other methods fail?"
     rows = [{"case": case.title, "kind": case.details["kind"], **row, "note": ""}
             for case in tried for row in case.tables[case.key].by_title()]  # fmt: skip
     table = EVERY_METHOD.table_of(rows)
     others = f" and {len(failing) - 1} more hard cases" if len(failing) > 1 else ""
-    parts = (Part(sentence, verdict, miss="".join(failing[:1]) + others, quantities=(stable,)),)
+    miss = f"the engine fails in the hard case: {failing[0]}{others}" if failing else ""
+    parts = (Part(sentence, verdict, miss=miss, quantities=(stable,)),)
     tables = {EVERY_METHOD.key: table.without("note") if rows else table}
     return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures, (stable,))
 

@@ -176,8 +176,8 @@ def painleve_rod() -> TrajectoryCase:
         "Painlevé (1895); Génot and Brogliato (1999); Stewart (2000)",
         "the effective inertia of the sliding contact is negative: rigid bodies have no acceleration, spring forces "
         "diverge",
-        "it jams: a rigid contact at once, a spring once its force has grown large enough",
-        f"springs: the slip of the rod's own equations, stopped after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
+        "it jams: with a rigid contact at once, with a spring as soon as the force is large enough",
+        f"springs: the rod slips by its own equations and stops after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
         on_floor("painleve_rod", "Painlevé's rod", [_ROD], _ON_END, source="Painlevé (1895)", rate=4000, duration=0.1),
         _measure_rod, _WORLDS,
     )  # fmt: skip
@@ -255,10 +255,10 @@ def stick_slip() -> TrajectoryCase:
     return TrajectoryCase(
         "Stick-slip oscillator and its limit cycle",
         "Den Hartog, Trans. ASME 53 (1931); the block on a belt of textbooks",
-        "each cycle ends in a stick of no length, at no speed and at the very edge of the cone",
+        "each cycle ends in a stick of zero length, at zero speed and at the very edge of the friction cone",
         "one slip, one stick, then for ever the same cycle of 2π/ω",
         "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "
-        "v = V (1 − cos ωt), whatever it began with",
+        "v = V (1 − cos ωt), for every start",
         on_floor("stick_slip", "A plate pushed by a spring", [plate, presses], contact, rate=4000, duration=_PRESSED),
         measure, ("IAPB", "PB"),
     )  # fmt: skip

@@ -26,8 +26,8 @@ def chatter() -> TrajectoryCase:
     """A ball dropped from 0.1 m with e = ½."""
     return TrajectoryCase(
         "Contact chatter: infinitely many bounces in 0.43 s", "Zeno's bouncing ball; textbook",
-        "the bounces accumulate: an event-driven method never passes that instant, and a time-stepping method may keep "
-        "bouncing",
+        "the bounces accumulate at one instant: an event-driven method never passes it, and a time-stepping method may "
+        "keep bouncing",
         "the parabolas as far as the time step resolves them, then rest",
         f"parabolas of heights h e²ᵏ in closed form, at rest from {_END_OF_BOUNCES:.4f} s on",
         on_floor("chatter", "A ball that chatters to rest", [ball("ball", _RADIUS, _RADIUS + _HEIGHT, axis=[0, 1])],
@@ -78,8 +78,8 @@ def wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
 
     return TrajectoryCase(
         name, "Colgate and Schenkel, J. Robotic Systems 14 (1997); scenes/wall_1d.yaml", why_hard, expected,
-        "Colgate and Schenkel's theorem: passive at the bound; beyond it no promise, so what is made is measured; "
-        "the motion: the sampled wall, tool and device written out for one coordinate",
+        "Colgate and Schenkel's theorem promises passivity up to the bound; beyond it, created energy is measured. The "
+        "motion is that of the sampled wall, tool and device, written out for one coordinate",
         load_scene(find_scene("wall_1d")).with_values(values), measure,
     )  # fmt: skip
 

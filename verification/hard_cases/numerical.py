@@ -41,7 +41,7 @@ def printed_formula_gains() -> HardCase:
         "Rows 1e-4 apart on κ(M) = 1e6, elastic",
         "erratum 6 of the paper; normal equations: Higham, Accuracy and Stability (2002)",
         "W has condition 1e8 from the rows and 1e6 from M: its small singular values are noise",
-        "no gain; the printed formula inverts noise",
+        "no energy is gained; the printed formula inverts noise",
         mass, rows, rng.normal(size=d), 1.0,
     )  # fmt: skip
 
@@ -59,8 +59,8 @@ def hilbert_rows() -> HardCase:
     rows = 1.0 / (np.arange(n)[:, None] + np.arange(n) + 1.0)
     return HardCase(
         "Hilbert rows, n = 8", "Hilbert (1894); the classical rank decision",
-        "full rank exactly, condition 1.5e10: singular values on both sides of any tolerance",
-        "restitution met and no energy gain; how many of the smallest directions count is a choice",
+        "the exact rank is full, the condition number 1.5e10: singular values lie on both sides of any tolerance",
+        "restitution is met and no energy is gained; how many of the smallest directions count is a choice",
         np.eye(n), rows, np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]), 0.5, well_posed=False,
     )  # fmt: skip
 
@@ -74,7 +74,7 @@ def kahan_rows() -> HardCase:
         "Kahan rows, n = 24",
         "Kahan, Numerical linear algebra (1966): rank revealed wrongly by pivoted factorizations",
         "smallest singular value far below every pivot",
-        "restitution met and no energy gain",
+        "restitution is met and no energy is gained",
         np.eye(n), rows, np.cos(np.arange(n)), 0.8, well_posed=False,
     )  # fmt: skip
 

@@ -115,9 +115,10 @@ def _laws(study: Study) -> Iterator[tuple[str, str]]:
 
 def _laws_say(table: Table) -> Iterator[Part]:
     caught = table.column(_CAUGHT)
-    yield Part(f"{sum(table.decided)} of {len(table.rows)} laws hold on random and adverse inputs.",
+    yield Part(f"{sum(table.decided)} of {len(table.rows)} laws hold on random and on error-provoking inputs.",
                verdict_of_law(table.holds))
-    yield Part(f"{sum(caught)} of {len(caught)} planted faults are caught.", verdict_of_law(caught))
+    yield Part(f"The checks catch {sum(caught)} of {len(caught)} faults that are planted in the code to test them.",
+               verdict_of_law(caught))
 
 
 properties = Topic(
@@ -126,7 +127,7 @@ properties = Topic(
     checks=(Check(  # the worst of random cases depends on rounding, so it is printed but not compared
         key="laws", question="Does the law hold, and is its planted fault caught?", cases=_laws,
         row=lambda study, case: KINDS[case[0]](study, case[1]), says=_laws_say, prose=["worst"]),),
-    says=lambda tables, parts: f"{parts[0].sentence[:-1]}; {parts[1].sentence}",
+    says=lambda tables, parts: f"{parts[0].sentence} {parts[1].sentence}",
 )
 
 
@@ -147,9 +148,9 @@ def _gains_say(table: Table) -> Iterator[Part]:
     totals = {row["method"]: row for row in table.where(**{"condition of M from": "all"}).records()}
     ours, printed = totals.get("factored"), totals.get("gram_pinv, as printed")
     if ours and printed:
-        most = " gains no energy" if ours[GAIN] <= 0.0 else \
+        most = " never adds energy" if ours[GAIN] <= 0.0 else \
             f"'s largest relative energy gain is {ours[GAIN]:.1e}, {ours[SHARE]:.2g} of its bound 10 d ε √κ(M)"
-        yield Part(f"In {ours['impacts']:,} random impacts the engine{most}; the printed formula gains up to "
+        yield Part(f"In {ours['impacts']:,} random impacts the engine{most}. The printed formula adds up to "
                    f"{printed[GAIN]:.2g} times the energy before.", REPRODUCED if ours[ABOVE] == 0 else REFUTED)
 
 
@@ -158,8 +159,8 @@ energy_gains = Topic(
     checks=(Check(
         key="impacts", question="How much energy do random impacts gain, with and without the clamp, and as printed?",
         cases=lambda study: METHODS, row=_gains, says=_gains_say, digits=3,
-        note="d 1 to 30, c 0 to 100, rank deficient, e in [−1, 1]; velocities N(0, I) in v and in Lᵀv; energies in "
-        "double-double."),),
+        note="1 to 30 coordinates d, 0 to 100 contacts, rows of any rank, e in [−1, 1]. The velocities are normally "
+        "distributed, in v or in Lᵀv with M = L Lᵀ. Energies are computed in double-double arithmetic."),),
     says=lambda tables, parts: " ".join(part.sentence for part in parts),
 )
 
@@ -177,10 +178,10 @@ def printed_formula() -> Finding:
     gain = relative_energy_gain(case.mass_matrix, case.velocity, given["v⁺ as computed"])
     exact = exact_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).rounded_velocity
     sentence = (
-        f"The formula as printed gains {gain:.2g} of the kinetic energy, in exact rationals, on {case.contacts} rows "
-        f"of {case.coordinates} coordinates with e = {case.restitution:g}. The passivity kit found and shrank this "
-        f"case by itself; {verdict.failures} of its {verdict.checked} impacts gained energy, at most "
-        f"{verdict.largest:.2g} of it."
+        f"With {case.contacts} rows, {case.coordinates} coordinates and e = {case.restitution:g}, formula (21) as "
+        f"printed adds {gain:.2g} of the kinetic energy, computed in exact rationals. The passivity kit found and "
+        f"simplified this case by itself. {verdict.failures} of its {verdict.checked} impacts gained energy, at most "
+        f"{verdict.largest:.2g} of the energy before."
     )
     return counterexample("gram_pinv", verdict.statement, sentence, given | {"v⁺ exact, rounded": exact},
                           report.counterexample_test)
@@ -192,9 +193,9 @@ def restitution_per_contact() -> Finding:
                                           impacts=COUNTER_IMPACTS // 2, unequal_restitution=True)
     gain = relative_gain(case.mass_matrix, case.velocity, given["v⁺ as computed"])
     sentence = (
-        f"Equalities with one restitution per contact, J v⁺ = −E J v⁻, multiply the kinetic energy by "
-        f"{1.0 + gain:.3g}. The passivity kit found and shrank this case. Where restitutions differ, the engine uses "
-        "Poisson's law (two LCPs), which is passive."
+        "Equalities with one restitution per contact, J v⁺ = −E J v⁻, multiply the kinetic energy by "
+        f"{1.0 + gain:.3g}. The passivity kit found and simplified this case. Where restitutions differ, the engine "
+        "uses Poisson's law (two LCPs), which is passive."
     )
     return counterexample("J v⁺ = −E J v⁻", verdict.statement, sentence, given, report.counterexample_test)
 
@@ -215,8 +216,8 @@ def saturation() -> Finding:
     clipped, fitted = check(case, engine.saturated), check(case, engine.scaled)
     _, force = engine.saturated(case.impulse, case.dt, case.force_limit)
     sentence = (
-        f"A device that clips each component of an impulse by itself gains {clipped.value:.2%} of its kinetic energy, "
-        f"while the tool loses energy. With one factor for the whole impulse both lose {-fitted.value:.2%}."
+        f"A device that clips each component of an impulse on its own gains {clipped.value:.2%} of its kinetic energy, "
+        f"while the tool loses energy. If one factor scales the whole impulse, both lose {-fitted.value:.2%}."
     )
     given = {**_arrays(case.impact), "impulse [N s]": case.impulse, "force limit [N]": case.force_limit,
              "impulse the device renders [N s]": case.dt * force}

@@ -96,11 +96,13 @@ def filters(table: Table) -> Part:
     both = table.where(filters="both filters")
     left = [f"{row['damping']:g}" for row in both.records() if row["false collisions"]]
     return Part.of(
-        "C18: false collisions of a ball that rolls in the faceted socket, at contact damping "
-        f"{', '.join(f'{b:g}' for b in both['damping'])} N s/m and with filter distances above the "
-        f"{1e3 * EDGE_JUMP:.1f} mm between contacts on neighbouring facets", counts, "none with both filters",
+        "C18: false collisions of a ball that rolls in the faceted socket. The contact damping is "
+        f"{', '.join(f'{b:g}' for b in both['damping'])} N s/m; the filter distances exceed the "
+        f"{1e3 * EDGE_JUMP:.1f} mm between contacts on neighbouring facets", f"for these dampings: {counts}",
+        "none with both filters",
         REFUTED if len(left) == len(both.rows) else MIXED if left else REPRODUCED,
-        miss=f"false collisions remain at a damping of {', '.join(left)} N s/m" if left else "")  # fmt: skip
+        miss="a ball that rolls over facets collides falsely in spite of the contact filters at a damping of "
+             f"{', '.join(left)} N s/m" if left else "")  # fmt: skip
 
 
 IN_TIME = Check(key="false collisions in time", question="When do the false collisions happen?", cases=_cases,

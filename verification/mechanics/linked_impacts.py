@@ -130,15 +130,15 @@ def findings(table: Table) -> Iterator[Part]:
     relative = table.only(treatment != PER_BODY for treatment in table["treatment"])
     energy, momentum = max(map(abs, relative["energy change"])), max(relative["momentum change"])
     yield Part.of(
-        "Newton's cradles of 2 to 7 balls and Bernoulli's three balls, relative rows (12), solved at once or event by "
-        "event", f"energy changes by at most {energy:.1e}, momentum by at most {momentum:.1e}",
+        "Newton's cradles of 2 to 7 balls and Bernoulli's three balls with relative rows (12), solved all at once or "
+        "one contact after the other", f"energy changes by at most {energy:.1e}, momentum by at most {momentum:.1e}",
         f"at most {CONSERVED:g}", REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
     per_body = table.where(treatment=PER_BODY)
     energy, least = max(map(abs, per_body["energy change"])), min(per_body["momentum change"])
     yield Part.of(
-        "The same with the per-body rows (13)-(14), erratum 3",
-        f"energy changes by at most {energy:.1e}, but momentum always by at least {least:.2g} times its value: the "
-        "striking ball rebounds as from a wall", "momentum changes, as erratum 3 says",
+        "The same balls with the paper's per-body rows (13)-(14)",
+        f"energy changes by at most {energy:.1e}, but momentum always by at least {least:.2g} times its value, because "
+        "the striking ball rebounds as from a wall", "momentum changes, which is erratum 3",
         REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
     if five := table.where(problem="cradle of 5").records():
         yield _rows_decide(five)
@@ -153,7 +153,7 @@ def _rows_decide(five: Sequence[Row]) -> Part:
     words = "; ".join(f"{name} ({', '.join(f'{v + 0.0:.1f}' for v in values)})" for name, values in after.items())
     apart = min(float(np.abs(a - b).max()) for a, b in combinations(after.values(), 2))
     return Part.of(
-        "Conservation laws do not determine the outcome; it depends on which contacts enter the collision",
+        "Conservation laws do not determine the outcome; the choice of contacts that enter the collision does",
         f"velocities of five balls after the impact: {words} m/s. The paper uses the contacts that approach. Only "
         "solving the contacts one after the other passes the impulse to the last ball", "outcomes that differ",
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
@@ -162,5 +162,5 @@ def _rows_decide(five: Sequence[Row]) -> Part:
 LINKED_IMPACTS = Check(
     key="linked impacts", question="What do touching balls do in an elastic impact?",
     cases=lambda _: (*(cradle(n) for n in range(2, 8)), bernoulli()), row=_rows, says=findings,
-    note="Elastic impacts of equal frictionless balls; changes are relative to what there was before.",
+    note="Elastic impacts of equal frictionless balls. Changes are relative to the energy or momentum before.",
 )  # fmt: skip

@@ -63,9 +63,9 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
          len(one.twins)) for one in records])  # fmt: skip
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
     confirmed = sum(one.sympy == YES for one in records)
-    sentence = (f"{proved} of {len(records)} statements are proved: a program expands the certificate of every step. "
+    sentence = (f"{proved} of {len(records)} statements are proved: a program checks the certificate of every step. "
                 f"SymPy confirms {'all ' * (confirmed == proved)}{confirmed}. Exact counterexamples refute "
-                f"{twins} deliberately altered statements.")
+                f"{twins} statements that we altered to be wrong.")
     parts = [Part(sentence, REPRODUCED if proved == len(records) else REFUTED)]
     tables = {"statements": table}
     if development:

@@ -122,10 +122,10 @@ def _of_books(table: Table) -> Part:
     words = ", ".join(f"{row['scene']} {row[GAIN_SHARE]:.1f} %" for row in made)
     return Part.of(
         "The stored energy never exceeds the energy at the start plus the work done on the scene",
-        f"{len(rows) - len(made)} of {len(rows)} scenes"
-        + (f". In the others time stepping, not the impacts, creates energy at some instant: {words} of the energy "
-           "exchanged" if made else ""), "all scenes", MIXED if made else REPRODUCED,
-        miss=f"time stepping creates energy in {len(made)} of {len(rows)} scenes ({words} of the energy exchanged)"
+        f"holds in {len(rows) - len(made)} of {len(rows)} scenes"
+        + (f". Elsewhere time stepping, not an impact, creates energy at some instant: {words} of the energy exchanged"
+           if made else ""), "all scenes", MIXED if made else REPRODUCED,
+        miss=f"in {len(made)} of {len(rows)} scenes time stepping creates energy ({words} of the energy exchanged)"
              if made else "")
 
 
@@ -138,18 +138,19 @@ def _of_residuals(table: Table) -> Iterator[Part]:
     below = ", ".join(f"{row['scene']} ({row['order measured']:.2f})" for row in short)
     yield Part.of(
         "The residual of the energy balance is rounding, or falls as the step is shortened",
-        f"rounding in {len(rows) - len(tried)} scenes; orders from {orders[0]:.2f} to {orders[-1]:.2f} (median "
-        f"{float(np.median(orders)):.2f}) in {len(tried)}" + (f". Below the declared order: {below}" if short else ""),
+        f"rounding in {len(rows) - len(tried)} scenes; falls with an order of {orders[0]:.2f} to {orders[-1]:.2f} "
+        f"(median {float(np.median(orders)):.2f}) in {len(tried)} "
+        "scenes" + (f". Below the declared order: {below}" if short else ""),
         f"order {max(row['order declared'] for row in tried)}, which the integrator declares",
         MIXED if short else REPRODUCED)
     wide = sorted((row for row in rows if row[OPEN] > WORTH_NAMING), key=lambda row: float(row[OPEN]), reverse=True)
     said = ", ".join(f"{row['scene']} {row[OPEN]:.1f} %" for row in wide)
     yield Part.of(
-        "Residual at the scene's own time step, absolute values of motion and springs added",
+        "Residual at the scene's own time step; the absolute values of motion and springs are added",
         f"larger in {len(wide)} of {len(rows)} scenes{said and ': ' + said}",
         f"at most {WORTH_NAMING:.0f} % of the energy exchanged", MIXED if wide else REPRODUCED,
-        miss=f"time stepping leaves up to {wide[0][OPEN]:.1f} % of a scene's energy unaccounted for "
-             f"({wide[0]['scene']})" if wide else "")
+        miss=f"in the scene {wide[0]['scene']}, time stepping creates or loses {wide[0][OPEN]:.1f} % of the energy "
+             "exchanged" if wide else "")
 
 
 def over_time(run: Run) -> Iterator[Row]:
@@ -174,18 +175,18 @@ CONTACTS = Check(
 RESIDUALS = Check(
     key="what the books leave open", question="Does the residual fall with the integrator's order?",
     cases=lambda study: scene_names(), row=_open, says=_of_residuals, digits=3,
-    note="Residuals of the energy balance, absolute values of motion and springs added. No order: the "
-    f"residual is rounding, and no shorter step was tried. The step for a residual of {WORTH_NAMING:g} % is the "
-    "longest one tried that reaches it, or is extrapolated with the measured order.",
+    note="Residuals of the energy balance; the absolute values of motion and springs are added. A scene without an "
+    "order: its residual is rounding, and no shorter step was tried. The step for a residual of "
+    f"{WORTH_NAMING:g} % is the longest tried step that reaches it, or is extrapolated with the measured order.",
 )
 BOOKS = Check(
     key="energy ledger", question="Does the stored energy ever exceed the energy at the start plus the work done?",
     cases=lambda study: scene_names(), row=lambda study, name: book_row(_run(study, name)), says=_of_books, digits=3,
     note="End − start = work of hand and coupling − losses + residual. The residual is energy that time stepping "
-    "created (> 0) or lost (< 0). Its part in the motion comes from forces held constant over a step, its part in the "
-    "springs from evaluating them once a step and, in curved gaps, from pushing along J Δq instead of the path of the "
-    "touching points; the share adds both absolute values. A loss is also a force times a "
-    "path with the force held over each step, so it can come out slightly negative. Shares are of the energy "
+    "created (> 0) or lost (< 0). The residual of the motion comes from forces that are constant over a step. The "
+    "residual of the springs comes from evaluating them once a step and, in curved gaps, from pushing along J Δq "
+    "instead of the path of the touching points. The share adds both absolute values. A loss is a force times a path, "
+    "with the force constant over each step, so it can come out slightly negative. Shares are relative to the energy "
     "exchanged: the largest of kinetic energy, range of the potential energy, work of the hand and work of the "
     "coupling.",
 )
@@ -200,10 +201,10 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     deepest, widest = _most(contacts, "most penetration"), _most(residuals, OPEN)
     falls = sum(as_declared(row) for row in residuals)
     return (
-        f"{len(contacts)} scenes, {sum(row['dimensions'] == 3 for row in contacts)} of them in space: bodies overlap "
-        f"by at most {deepest['most penetration']:.2f} mm. The residual of the energy balance is rounding or falls "
-        f"with the integrator's order in {falls} scenes; at the scene's own time step it is at most "
-        f"{widest[OPEN]:.1f} % of the energy exchanged ({widest['scene']})."
+        f"In {len(contacts)} scenes, {sum(row['dimensions'] == 3 for row in contacts)} of them three-dimensional, "
+        f"bodies overlap by at most {deepest['most penetration']:.2f} mm. Time stepping creates or loses at most "
+        f"{widest[OPEN]:.1f} % of the energy exchanged ({widest['scene']}). In {falls} scenes this error is rounding, "
+        "or falls with the integrator's order as the step is shortened."
     )
 
 
@@ -211,8 +212,8 @@ scene_ledger = Topic(
     key="scene-ledger", title="The scenes",
     question="Every scene file of the project is run in the world IAPB at its own time step. An energy balance "
     "accounts for each run: the change of stored energy equals the work of hand and coupling minus the losses. The "
-    "residual is the error of time stepping; it must fall with the integrator's order when the step is shortened. "
-    "Residuals are given as shares of the energy exchanged. The absolute residuals of the motion and of the contact "
-    "springs are added, so opposite signs do not cancel.",
+    "rest, the residual, is the error of time stepping; it must fall with the integrator's order when the step is "
+    "shortened. Residuals are given as shares of the energy exchanged. The absolute residuals of the motion and of the "
+    "contact springs are added, so that opposite signs do not cancel.",
     checks=(CONTACTS, RESIDUALS, BOOKS, OVER_TIME), says=_answer,
 )

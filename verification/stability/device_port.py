@@ -190,10 +190,10 @@ def coupled(ports: Table) -> Part:
         case = row["the hand"], row["sensors"] == "ideal"
         most[case] = max(most.get(case, 0.0), row["needed / bound"])
     return Part.of(
-        "Damping for a passive device in CBuc, with the tool on a rigid wall, over Colgate's bound b = KT/2 + |B|",
-        f"{most[PRESSES, True]:.4f} with a pressing hand and ideal sensors. Late or coarse sensors need up to "
-        f"{most[PRESSES, False]:.3g}. A hand that moves in and out of contact needs up to {most[CROSSES, True]:.3g}, "
-        "because the coupler is already stretched when it switches on", "at most 1",
+        "Damping that makes the device passive in CBuc, with the tool on a rigid wall, divided by Colgate's bound "
+        "KT/2 + |B|", f"{most[PRESSES, True]:.4f} with a pressing hand and ideal sensors, up to "
+        f"{most[PRESSES, False]:.3g} with late or coarse sensors. A hand that moves in and out of contact needs up to "
+        f"{most[CROSSES, True]:.3g}, because the coupler is already stretched when it switches on", "at most 1",
         MIXED if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
@@ -202,10 +202,11 @@ def coordinated(ports: Table) -> Part:
     found = ports.only(world != COUPLER_WORLD for world in ports["world"])
     needed, sums = found["damping needed"], found["with the coordination's gains"]
     return Part.of(
-        "Damping for a passive device with the four-channel controller, over the bound KT/2 + |B| of the wall alone",
-        f"up to {max(found['needed / bound']):.3g}: {min(needed):.3g} to {max(needed):.3g} N s/m, because the hand "
-        f"also feels the coupling's {COORDINATION[1]:g} N s/m. With the coupling's gains added to the bound up to "
-        f"{max(map(truediv, needed, sums)):.3g}. The bound does not apply because the tool moves", "at most 1", MIXED)
+        "Damping that makes the device passive with the four-channel controller, divided by the bound KT/2 + |B| of "
+        "the wall alone", f"up to {max(found['needed / bound']):.3g}: the device needs {min(needed):.3g} to "
+        f"{max(needed):.3g} N s/m, because the hand also feels the coupling's {COORDINATION[1]:g} N s/m. With the "
+        f"coupling's gains added to the bound, the ratio is up to {max(map(truediv, needed, sums)):.3g}. The bound "
+        "does not apply, because the tool moves", "at most 1", MIXED)
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:
@@ -223,6 +224,7 @@ PORT = Check(
     cases=lambda study: product(WALLS[study.depth], SENSORS, MOTIONS), row=_leak,
     says=lambda table: (coupled(table), coordinated(table)),
     note="The complete device loop at 512 Hz. The hand moves to and fro by 0.5 mm; the worst of several speeds is "
-    "shown. Stiffness and damping are the coupler's in CBuc, else the wall's, with the coordination gains of Table I. "
-    "Leak: energy that the hand draws from the loop at b = KT/2 + |B|.",
+    "shown. In CBuc, stiffness and damping are those of the coupler. In the other worlds they are those of the wall, "
+    "and the coordination gains are those of Table I. Leak: energy that the hand draws from the loop at b = KT/2 + "
+    "|B|.",
 )

@@ -56,7 +56,8 @@ def peg(pegs: Table) -> Part:
     return Part.of(
         "With impulses the peg in the corner comes to rest no later than with penalties",
         f"in {sooner.count(True)} of {len(sooner) - sooner.count(None)} combinations of device and wall in which it "
-        f"comes to rest at all; bounces no more often in {fewer} of {len(pairs)}", "in all", verdict_of_trials(sooner))
+        f"comes to rest at all; it bounces no more often in {fewer} of all {len(pairs)} combinations", "in all",
+        verdict_of_trials(sooner))
 
 
 def _pulse(study: Study, name: str) -> dict[str, Any]:

@@ -58,13 +58,14 @@ def _of_maps(table: Table) -> Iterator[Part]:
     yield Part.of(
         "Walls that Colgate's condition b >= KT/2 + |B| calls passive, and that accelerated the hand",
         f"{gains or 'none'} of {passive[damped].sum()}. A further {(~passive & (theirs == SETTLES))[damped].sum()} "
-        "walls settle although the condition fails: it is for the worst hand, ours is a constant force", "none",
+        "walls settle although the condition fails, because the condition is for the worst hand and our hand is a "
+        "constant force", "none",
         REFUTED if gains else REPRODUCED)
     shares = ", ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
                        for one in dict.fromkeys(rate[bare].tolist()))
     yield Part.of(
-        "The paper's device has no damping, b = 0, so the condition holds for no wall",
-        f"with a constant force as the hand, penalties are still stable on {shares} of these walls", "passive walls",
+        "Walls that are stable with penalties on a device without damping (b = 0, as in the paper); the condition "
+        "holds for none of them", f"with a constant force as the hand: {shares}", "passive for every hand",
         MIXED)
 
 
@@ -74,13 +75,14 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray) -> Part:
     more = [ours[of].sum() / theirs[of].sum() for of in groups]
     lost = int((theirs & ~ours).sum())
     return Part(
-        f"Of {theirs.size:,} walls, {ours.sum()} are stable with impulses and {theirs.sum()} without "
-        f"({min(more):.2f} to {max(more):.2f} times as many, by sampling rate, sensor and damping of the device). "
-        f"Impulses destabilise {lost} walls.",
+        f"Of {theirs.size:,} walls (pairs of stiffness and damping), {ours.sum()} are stable with impulses and "
+        f"{theirs.sum()} without; the ratio is {min(more):.2f} to {max(more):.2f}, depending on sampling rate, sensor "
+        f"and damping of the device. {lost} walls are stable only without impulses.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Stable walls with impulses, and without", target="more with, and none lost",
         measured=f"{ours.sum()} and {theirs.sum()} of {theirs.size:,}; {lost} are stable only without",
-        miss=f"impulses destabilise {lost} of {theirs.size:,} walls (pairs of stiffness and damping)" if lost else "")
+        miss=f"{lost} of {theirs.size:,} walls (pairs of stiffness and damping) are stable only without impulses"
+             if lost else "")
 
 
 def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
@@ -106,7 +108,8 @@ def _hard(table: Table) -> Part:
         for key in ("rate-hardness", "penetration")
     )
     return Part.of(
-        f"Rate-hardness and penetration at the paper's wall damping of {PAPER_DAMPING:g} N s/m, impulses over springs",
+        f"Rate-hardness and penetration with impulses, relative to springs alone, at the paper's wall damping of "
+        f"{PAPER_DAMPING:g} N s/m",
         f"{min(harder):.3g} to {max(harder):.3g} times as hard (median over stiffnesses), {min(deeper):.2f} to "
         f"{max(deeper):.2f} times as deep", "harder, no deeper",
         REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)
@@ -130,10 +133,10 @@ HARDNESS = Check(
 contact_stability = Topic(
     key="stability", title="Stability of contact",
     question="A virtual wall in a sampled loop can feed energy to the hand. First, a constant force pushes a mass of 2 "
-    "kg against walls over a grid of stiffness and damping; the loop samples at 512 Hz or 1 kHz, and the motion "
-    "between samples is exact. Then the peg of Figure 4 runs in the engine's own loop. The dashed line is Colgate's "
-    "condition for passivity, b >= KT/2 + |B|, which is sufficient for any hand. A wall is stable if the mass comes to "
-    "rest.",
+    "kg against many walls; a wall is one pair of stiffness K and damping B. The loop samples at 512 Hz or 1 kHz, and "
+    "the motion between samples is exact. A wall is stable if the mass comes to rest. Then the peg of Figure 4 runs in "
+    "the engine's own loop. Colgate's condition, b >= KT/2 + |B| with the damping b of the device and the period T, "
+    "makes a wall passive for every hand.",
     checks=(MAPS, DAMPINGS, HARDNESS, PEG, PULSES, PORT),
     says=lambda tables, parts: parts[0].sentence if "maps" in tables else "",
 )
