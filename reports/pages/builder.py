@@ -182,10 +182,10 @@ def counted(part: Part) -> str:
     if not part.decided and not part.unknown:
         return ""
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
-    cases = f" on {part.cases} cases" if part.cases else ""
+    cases = f" ({part.cases} cases in all)" if part.cases else ""
     region = part.region
-    where = (f" over all conditions; the stated range is {region.share:.0%} of them, found with {region.searched} "
-             f"trials and confirmed by {region.others + region.fresh} others") if region else ""  # fmt: skip
+    where = (f" over all conditions; the stated range covers {region.share:.0%} of them: {region.searched} trials led "
+             f"to it, {region.others + region.fresh} others confirm it") if region else ""  # fmt: skip
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 

@@ -124,7 +124,7 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
         least, most = (f"{end(races['ratio']):.2g}" for end in (min, max))
         yield f"With all bodies at rest, a step takes {least} to {most} times as long as one of the engine MuJoCo."
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
-        yield (f"Lemke's complementarity method is faster than our impact in {raced.holds.count(False)} of the "
+        yield (f"Lemke's complementarity method is faster than the engine in {raced.holds.count(False)} of the "
                f"{len(raced.decided)} tested impacts whose times differ clearly.")
 
 

@@ -136,7 +136,7 @@ def energy_gains(batch: Batch) -> Floats:
 
 PASSIVE = "kinetic energy does not rise"
 WITH_HALF = "loss is ½(1 − e²) times the form"
-AS_PRINTED = "loss is (1 − e²) times the form, as printed"
+AS_PRINTED = "loss is (1 − e²) times the form"
 EXACT_LOSS = "loss is ½(1 − e²) times the form, in rationals"
 
 
@@ -403,7 +403,7 @@ C08 = replace(_PASSIVE, row=_random_or_peg,
 
 RESOLVER = "velocity after an impact with e = -1"
 TRAJECTORY = "trajectory with e = -1"
-ALMOST = "trajectory at the next double above e = -1"
+ALMOST = "trajectory with e one rounding step above -1"
 JUST_ABOVE = float(np.nextafter(-1.0, 0.0))
 # An impulse of 1e-16 of its usual size moves the 2 kg peg by 1e-17 m; contacts may amplify this distance [m, rad].
 SAME_TRAJECTORY = 1e-11
@@ -443,7 +443,7 @@ C09 = Check(
     key="C09", question="With e = -1 the simulation is the penalty-based simulation.", place="Section VI",
     quantity="Largest change of velocity by an impact with e = -1; largest distance between the trajectories of "
     "device and tool and those of PB, by coordinate.",
-    tolerance="At e = -1: zero. At the next double above -1: 1e-11 m or rad, because impulses there are 1e-16 of their "
+    tolerance="At e = -1: zero. One rounding step above -1: 1e-11 m or rad, because impulses there are 1e-16 of their "
     "usual size, and contacts amplify their effect.",
     cases=lambda study: [Family(1, 1, 1, 1e0), Family(3, 6, 3, 1e2), Family(6, 20, 4, 1e4), Family(12, 60, 8, 1e8),
                          *start_conditions(study.depth)],

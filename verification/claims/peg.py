@@ -125,7 +125,7 @@ def _median(values: Iterable[float]) -> float:
 # C10: the trajectory. With the paper's threshold every approaching contact collides. Larger thresholds are ours.
 
 PAPERS = Condition().approach_velocity
-LARGER = "larger approach velocity"
+LARGER = "if only faster contacts collide"
 
 
 def _all_starts(study: Study) -> tuple[Condition, ...]:

@@ -13,8 +13,8 @@ from verification.mechanics.false_collisions import EDGE_JUMP, count_false, sock
 from verification.region import Region
 from verification.table import Row, Table
 
-REACHES = "coherence that reaches the contact on the next facet (our condition)"
-SHORT = "coherence above speed × step (the paper's condition), short of the next facet"
+REACHES = "coherence distance that reaches the contact on the next facet (our condition)"
+SHORT = "coherence distance above speed × step (the paper's condition) that does not reach the next facet"
 CLUSTERING = "clustering alone"
 CLUSTER = {"quick": (0.0, 4.0, 6.0), "full": (0.0, 2.0, 4.0, 6.0, 10.0)}  # [mm]
 COHERENCE = {"quick": (0.0, 1.0, 2.0, 4.0, 6.0, 10.0), "full": (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)}  # [mm]
@@ -109,7 +109,7 @@ C18 = Check(
     tolerance="No false collision remains. The paper requires a coherence distance above speed × step; a trial with "
     "less cannot tell.",
     cases=_cases, row=_row, holds=_holds, says=_says, draw=_draw, parts=["part"],
-    roles={CLUSTERING: BEYOND}, named={SHORT: "coherence distances short of the next facet"},
+    roles={CLUSTERING: BEYOND}, named={SHORT: "coherence distances that do not reach the next facet"},
     conditions=["cluster_distance", "coherence_distance", "damping", "rate"],
     axes=("cluster_distance", "coherence_distance", "damping"),
 )  # fmt: skip

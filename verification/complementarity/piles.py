@@ -146,7 +146,7 @@ def _says(table: Table) -> Part:
         "impulses pull. If impulses may only push (method \"poisson\", world IAPB-push), the velocity equals that of "
         f"the LCP to {max(table['pushing from the LCP']):.0e}", "in all impacts",
         verdict_of_share(agree / piles), "piles",
-        miss=f"in piles with more than {limit} contacts at once, {pulling:.0f} % of IAPB's impulses pull")  # fmt: skip
+        miss=f"with more than {limit} contacts at once, {pulling:.0f} % of IAPB's impulses pull instead of push")
 
 
 def piles(folders: Iterable[Path | str]) -> Check:

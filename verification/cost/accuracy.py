@@ -378,8 +378,8 @@ def _bias_says(table: Table) -> Part:
 ORDER_BIAS = Check(
     key="order bias", question="Does the time of a method depend on the method before it?", cases=lambda _: (25,),
     row=order_bias, says=_bias_says, timed=("least", "after", "most", "then after", "spread"), digits=3,
-    note="{} contacts, {} coordinates; median of 25 rounds, relative to the median of each round. Least and most: the "
-    "methods timed just before.".format(*BIAS),
+    note="Impacts with {} contacts and {} coordinates. The median of 25 rounds, relative to the median of each round. "
+    "“After” names the method that was timed just before.".format(*BIAS),
 )  # fmt: skip
 
 TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d

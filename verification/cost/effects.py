@@ -208,9 +208,9 @@ def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
     kinetic, share = whole.kinetic(), saved(ratio)
     place, device = _farthest(whole.places(), other.places()), _farthest(whole.device_places(), other.device_places())
     energy = 100.0 * float(np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), np.finfo(float).tiny))
-    moved = f"up to {_length(place or 0.0)} elsewhere"
-    moved += f", the device {_length(device)}" if device is not None else ""
-    change = f"{moved}; kinetic energy up to {energy:.3g} % of its largest off"
+    moved = f"motion differs by up to {_length(place or 0.0)}"
+    moved += f", that of the device by {_length(device)}" if device is not None else ""
+    change = f"{moved}; kinetic energy differs by up to {energy:.3g} % of its largest value"
     if whole.same_motion(other):
         kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
         touching = whole.touching()

@@ -121,6 +121,6 @@ MEASURED = ("median [µs]", "least [µs]", "largest [µs]")
 IMPACT_TIMES = Check(
     key="time per impact", question="", row=time_impact, timed=(*MEASURED, "note"), digits=3,
     cases=lambda _: [Size(family, contacts) for contacts in CONTACTS for family in FAMILIES],
-    note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. Kernels are called from compiled code, "
-    "all others from Python, with all checks; our adapter of the solvers also forms W.",
+    note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. Kernels are called from compiled code. "
+    "All other methods are called from Python, with their checks; our adapter of the solvers also forms W.",
 )  # fmt: skip

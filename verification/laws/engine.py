@@ -34,7 +34,7 @@ def budgets(case: ImpactCase) -> range:
     return range(min(case.contacts, case.coordinates) + 1)
 
 
-@law(ENGINE_LAWS, "truncation", "a result cut short at any number of rows is passive, and none is no impulse",
+@law(ENGINE_LAWS, "truncation", "an impact stopped after any number of rows is passive; without rows, no impulse",
      partial(draw_case, largest_condition=1e12), resolve_impact)
 def every_budget_is_passive(case: ImpactCase, subject: Callable[..., Any]) -> Found:
     """Largest relative energy gain over all budgets; infinite if a budget of 0 rows still gives an impulse."""
@@ -254,7 +254,7 @@ def hand_port_is_passive(case: HeldDevice, subject: Wall) -> Found:
     return relative, 4.0 * len(case.positions) * EPS
 
 
-@law(ENGINE_LAWS, "extremes", "every finite input gives a finite motion or an error by name",
+@law(ENGINE_LAWS, "extremes", "every finite input gives a finite motion or a named error",
      draw_extreme_case, resolve_impact)
 def finite_or_named(case: ImpactCase, subject: Resolver) -> Found:
     """0 if the resolver returns a finite velocity or raises an IapbError, else 1; the tolerance is 0."""

@@ -274,8 +274,8 @@ def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
         easy += [error] if condition <= _EASY else []
     yield {"quantity": "v⁺ of independent rows, as a share of 100 d ε κ(A)²", "cases": len(shares),
            "largest difference": max(shares), "tolerance": 1.0,
-           "why this tolerance": "a hundred roundings per coordinate, times κ(A)², the condition of the Delassus "
-           "matrix that it forms"}  # fmt: skip
+           "why this tolerance": "a hundred roundings per coordinate, times κ(A)², the condition number of the "
+           "Delassus matrix"}  # fmt: skip
     yield {"quantity": "v⁺ where κ(A) ≤ 10, kinetic metric", "cases": len(easy), "largest difference": max(easy),
            "tolerance": 1e-12, "why this tolerance": "plain rounding"}  # fmt: skip
 

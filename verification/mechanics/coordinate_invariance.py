@@ -175,7 +175,7 @@ def holds(row: Row) -> bool | None:
 COORDINATES = Check(
     key="coordinate invariance", question="An impact has one outcome, whatever the coordinates it is solved in.",
     cases=_cases, row=_row, holds=holds, parts=("coordinates",), spans=("error",),
-    note=f"C06. Tolerance: {AGREEMENT:g} of the velocity in the kinetic metric where κ(M) and κ(∂f/∂r)² are at most "
-         f"{MODERATE:g} and rows are redundant exactly or separated (σ_min ≥ {SEPARATED:g}); elsewhere "
-         f"{CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min, which says nothing once it exceeds 1.",
+    note=f"See claim C06. The tolerance is {AGREEMENT:g} of the velocity in the kinetic metric, if κ(M) and κ(∂f/∂r)² "
+    f"are at most {MODERATE:g} and each row is exactly redundant or well separated (σ_min ≥ {SEPARATED:g}). Otherwise "
+    f"it is {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min; a tolerance above 1 means that nothing is tested.",
 )  # fmt: skip

@@ -157,7 +157,7 @@ def holds(found: dict[str, Any]) -> bool:
 OPERATING = Check(
     key="operating", cases=_cases, row=_row, spans=("steps near singular", "largest joint speed"),
     question="Led by any point of any link, the arm passes its singular poses with finite motion and bounded energy.",
-    note="Tolerance: every number is finite; the energy residual, relative to the energy exchanged, is at most the "
-         "largest joint rotation per step [rad], the error of a first-order method; and arm and spring store at most "
-         "that much more than the hand has put in.",
+    note="Tolerance: every number is finite. The energy residual, relative to the energy exchanged, is at most the "
+    "largest joint rotation per step [rad], which is the error of a first-order method. Arm and spring store at most "
+    "that much more energy than the hand has put in.",
 )  # fmt: skip

@@ -264,5 +264,6 @@ TUMBLING = Check(
     key="tumbling", question="A tumbling body converges to the closed form with the order that the integrator "
     "declares; its energy and angular momentum converge at least as fast.",
     cases=lambda _: product(MOTIONS, METHODS), row=_rows,
-    note=f"Tolerance: order within {ORDER_TOLERANCE} of the declared one, by the two finest steps above rounding.",
+    note=f"Tolerance: order within {ORDER_TOLERANCE} of the declared one, measured at the two finest steps with errors "
+         "above rounding.",
 )  # fmt: skip
