@@ -93,7 +93,7 @@ def saturation_counterexample() -> LimitedImpact:
 
 
 @law(ENGINE_LAWS, "device_limits",
-     "an impulse cut to the device's limits by one factor per group is passive for tool and device",
+     "an impulse scaled to the device's limits, by one factor per group, is passive for tool and device",
      draw_limited, scaled)
 def limited_impulses_are_passive(case: LimitedImpact, subject: Renderer) -> Found:
     """Larger relative energy gain of tool and device, both from v⁻; infinite if the device exceeds its limit."""
@@ -146,7 +146,7 @@ def _room(bodies: list[Values], name: str, x: float) -> Values:
     return {"bodies": [moved(body) for body in bodies], "walls": walls}
 
 
-@law(ENGINE_LAWS, "group_splitting", "two groups that share nothing move the same, simulated together or apart",
+@law(ENGINE_LAWS, "group_splitting", "two groups that share nothing move alike, simulated together or apart",
      draw_rooms, SceneCase.simulate)
 def groups_apart_move_alike(case: TwoRooms, subject: Callable[[SceneCase], Run]) -> Found:
     """Distance between the states of the joint and the separate run, at the first instant at which they differ.
@@ -246,7 +246,7 @@ def leak(case: HeldDevice, wall: Wall) -> float:
     return leaked(x, -np.array(force), case.device_damping, loop.dt)
 
 
-@law(ENGINE_LAWS, "hand_port", "the hand gets no energy out of a sampled wall while b ≥ KT/2 + |B|",
+@law(ENGINE_LAWS, "hand_port", "the hand gets no energy from a sampled wall if b ≥ KT/2 + |B|",
      draw_wall, penalty_wall)
 def hand_port_is_passive(case: HeldDevice, subject: Wall) -> Found:
     """Leak relative to the energy exchanged with wall and damper; the tolerance covers the rounding of n sums."""
@@ -292,7 +292,7 @@ def draw_held_device(rng: np.random.Generator) -> HeldDevice:
 
 
 @law(ENGINE_LAWS, "device_port",
-     "the hand gets no energy out of a device coupled to a tool on a rigid wall while b ≥ K_cpl T/2 + B_cpl",
+     "the hand gets no energy from a device coupled to a tool on a rigid wall if b ≥ K_cpl T/2 + B_cpl",
      draw_held_device, actuator_forces)
 def device_port_is_passive(case: HeldDevice, subject: Callable[[DeviceLoop, Floats], Floats]) -> Found:
     """Leak relative to the energy exchanged with coupler and damper.

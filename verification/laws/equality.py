@@ -129,7 +129,7 @@ def _change_and_ride(case: ImpactCase, resolver: Resolver) -> tuple[float, float
     return changed, apart
 
 
-@law(LAWS, "redundancy", "redundant rows give what an independent subset gives (25), (33)")
+@law(LAWS, "redundancy", "redundant rows give the same v⁺ as independent rows alone (25), (33)")
 def redundant_equals_reduced(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """C03: all rows together give the same velocity as any maximal independent subset of them."""
     rank = len(case.row_space)
@@ -207,7 +207,7 @@ def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     return case.distance(own_outcome(resolver, case), T @ outcome(resolver, other)), tolerance
 
 
-@law(LAWS, "groups", "bodies that share no contact do not feel one another")
+@law(LAWS, "groups", "bodies that share no contact do not influence each other")
 def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """Distance between the velocities of the case and its mirror image, resolved together and separately."""
     if not case.is_separated or case.speed == 0.0:
@@ -230,7 +230,7 @@ def same_input_same_output(case: ImpactCase, resolver: Resolver, bounds: Bounds)
     return 0.0 if np.array_equal(first, outcome(resolver, case)) else 1.0, 0.0
 
 
-@law(LAWS, "arguments", "the arguments are left as they were")
+@law(LAWS, "arguments", "the arguments are not changed")
 def arguments_are_left_alone(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """Number of arguments that the call has changed: the caller continues to use M, J and v⁻."""
     return float(own_answer(resolver, case)[1]), 0.0

@@ -100,7 +100,7 @@ def norm(vector: Floats) -> Floats:
     return np.asarray(np.max(np.abs(vector), axis=-1, initial=0.0))
 
 
-@law(TRAJECTORY_LAWS, "finite", "the state stays finite, or the run ends and says why")
+@law(TRAJECTORY_LAWS, "finite", "the state stays finite, or the run stops and gives the reason")
 def state_stays_finite(trajectory: Trajectory) -> Found:
     """Number of arrays with an entry that is not finite, plus 1 if an incomplete run gives no reason; tolerance 0."""
     run = trajectory.run
@@ -145,7 +145,7 @@ def impulses_explain_impacts(trajectory: Trajectory) -> Found:
     return max(float(np.max(apart)), float(np.max(lost))), 10.0 * impacts.v_plus.shape[1] * EPS * condition
 
 
-@law(TRAJECTORY_LAWS, "motion", "recorded forces explain the motion (1)")
+@law(TRAJECTORY_LAWS, "motion", "velocities change as the recorded forces demand (1)")
 def forces_explain_motion(trajectory: Trajectory) -> Found:
     """Largest |M Δv − Δt (Σ F − B − G)|∞ over |M|(|v| + |v'|) + Δt Σ|F|, in units of d ε.
 
@@ -164,7 +164,7 @@ def forces_explain_motion(trajectory: Trajectory) -> Found:
     return float(np.max(apart)), 20.0 * run.v.shape[1] * EPS
 
 
-@law(TRAJECTORY_LAWS, "kinematics", "q moves by the new velocity")
+@law(TRAJECTORY_LAWS, "kinematics", "q changes by the new velocity times the step")
 def velocity_moves_configuration(trajectory: Trajectory) -> Found:
     """Largest |q_{k+1} − q_k ⊕ Δt v_{k+1}|∞ over |q| + Δt |v|; rotations are integrated, as they are no vectors."""
     if not trajectory.is_explained:
@@ -178,7 +178,7 @@ def velocity_moves_configuration(trajectory: Trajectory) -> Found:
     return float(np.max(norm(moved - run.q[1:]) / size)), 16.0 * EPS
 
 
-@law(TRAJECTORY_LAWS, "ledger", "the energy ledger closes")
+@law(TRAJECTORY_LAWS, "ledger", "stored energy, work and losses balance")
 def ledger_closes(trajectory: Trajectory) -> Found:
     """Largest difference between a recorded and a recomputed energy term, relative to the energy exchanged.
 
@@ -219,7 +219,7 @@ def _residuals(trajectory: Trajectory) -> tuple[Floats, Floats]:
     return run.energy["integration_residual"], np.cumsum(np.diff(run.energy["potential"]) - constant_weight - lost)
 
 
-@law(TRAJECTORY_LAWS, "penalty", "resting contacts push by (5)")
+@law(TRAJECTORY_LAWS, "penalty", "resting contacts push with the force (5)")
 def contacts_push_by_the_penalty(trajectory: Trajectory) -> Found:
     """Largest |F − (−K s − B v_n)| of the contacts with a force, relative to the terms.
 
