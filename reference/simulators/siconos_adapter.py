@@ -16,6 +16,8 @@ STEP = 1e-3  # [s]
 # Relative residual of the solver above which a step is invalid; Siconos only prints a warning. Gauss-Seidel converges
 # slowly for redundant corners at rest (1e-5); a solver that has not converged leaves 1e-1.
 CONVERGED = 1e-3
+# [m] of contactBreakingThreshold: the best of 2 and 20 mm at rest. At an impact a contact must end soon.
+AT_REST, AT_IMPACTS = 2e-2, 2e-3
 
 
 class Siconos(Simulator):
@@ -33,7 +35,8 @@ class Siconos(Simulator):
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:
         """Return theta = 1/2, which conserves energy at e = 1, and Gauss-Seidel: Lemke fails for redundant corners."""
         return Settings(step or STEP, {"theta": 0.5, "solver": "NSGS", "iterations": 1e3, "tolerance": 1e-10,
-                                       "contactBreakingThreshold": 2e-3, "minimumPointsPerturbationThreshold": 3.0,
+                                       "contactBreakingThreshold": AT_REST if scene.rests else AT_IMPACTS,
+                                       "minimumPointsPerturbationThreshold": 3.0,
                                        "margins": 0.0})  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
