@@ -161,7 +161,7 @@ SAME_DAMPING, EQUAL_GAIN, BOTH, BOTH_SOONER, TUNED = RIVALS = (
     "same damping: impulses settle no later", "penalty damping that gives the same force: impulses settle no later",
     "best damping of each law for each wall: impulses settle wherever penalties do",
     "best damping of each law for each wall: impulses settle no later",
-    "best damping for each wall for penalties only: impulses settle no later",
+    "penalties at their best damping, impulses at the paper's: impulses settle no later",
 )
 FRESH = 5  # number of walls per loop drawn to confirm a region
 Case = tuple[Loop, Floats]  # and the stiffnesses of its walls
