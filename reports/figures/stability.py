@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.plot import Plot
-from reports.figures.style import BOUND, FORCE, LINK, MUTED, STYLES, LineStyle
+from reports.figures.plot import TIME, Plot
+from reports.figures.style import BOUND, FORCE, LINK, MUTED, STYLES, LineStyle, line_arguments
 from verification.stability.walls import GROWS, SETTLED_SPEED, SETTLES
 from verification.table import Table
 
@@ -70,5 +71,21 @@ def hardness(table: Table) -> Drawn:
                 rows = here.where(law=law).select(("stiffness", key)).rows
                 plot.curve([(stiffness, value) for stiffness, value in rows if value is not None], look)
             plot.log("stiffness [N/m]", labels[key])
+            if key == _FELT[-1]:  # little more than a decade
+                plot.ticks("y", (0.3, 1.0, 3.0))
         panels.append(Panel(plot.svg, f"{labels[key]} against stiffness, penalties and impulses.", labels[key]))
     return Drawn(panels, table, _LAWS)
+
+
+@recipe("stiff-wall", "wall/ideal", "wall/IAPB", "wall/PB")
+def stiff_wall(*runs: Run) -> Drawn:
+    """Draw the kinetic energy of the tool over time, in each world."""
+    looks, gains = {world: STYLES[world] for world in ("ideal", "IAPB", "PB")}, dict[str, str]()
+    with Plot("stiff-wall-0", kind=TIME) as plot:
+        for run, (world, look) in zip(runs, looks.items(), strict=True):
+            kinetic = run.energy["kinetic"]
+            gains[world] = f"{kinetic.max() / kinetic[0]:.2g}"
+            plot.axes.plot(run.time, 1e3 * kinetic, **line_arguments(look), markevery=150)
+        plot.axes.set(xlabel="t [s]", ylabel="kinetic energy of the tool [mJ]")
+    words = f"Largest kinetic energy, relative to the start: {', '.join(map(' '.join, gains.items()))}."
+    return Drawn([Panel(plot.svg, words)], None, looks, gains)

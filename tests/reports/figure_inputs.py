@@ -161,7 +161,8 @@ def made_motion(make_run: Callable[..., Run], scene: str, seed: int) -> Run:
 def all_inputs(make_run: Callable[..., Run]) -> dict[str, Any]:
     """Return the inputs of all figures but those of scenes in space and of some films: made-up motions and tables."""
     needed = sorted({name for recipe in RECIPES for name in recipe.needs})
-    scenes = {"corner": "peg_corner", "device": "peg_corner", "hole": "peg_hole", "group": "arm_pushing"}
+    scenes = {"corner": "peg_corner", "device": "peg_corner", "hole": "peg_hole", "group": "arm_pushing",
+              "wall": "wall_1d"}
     runs = {name: made_motion(make_run, scenes[name.split("/")[0]], k) for k, name in enumerate(needed)
             if name.split("/")[0] in scenes}  # fmt: skip
     given = {name: load_scene(find_scene(name[6:])).resolved() for name in needed if name.startswith("scene/")}

@@ -164,7 +164,7 @@ def test_hard_cases_are_seen_at_a_glance_and_a_refusal_or_an_empty_table_is_no_n
     skipped = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"source": "published problems"})
     case = hard_case(("factored", "stable", 1e-16), ("gram", "refused", None))
     page = joined(Evidence(hard_cases=(case, skipped), topics=(on_hard_cases(()),)))
-    for text in ('<span class="good">✓</span> factored: stable', '<span class="bad">✕</span> gram: refused',
+    for text in ('<span class="good">✓</span>&nbsp;factored: stable', '<span class="bad">✕</span>&nbsp;gram: refused',
                  "1 of 2 stable", "Skipped: needs bowl.lcp.", "0 of 0 hard cases"):
         assert text in page, text
     stable = hard_case(("IAPB", "stable", 0.0))
