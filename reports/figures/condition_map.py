@@ -17,42 +17,49 @@ from reports.figures.style import OUTCOMES
 from verification.table import Table
 
 _SIZE = (4.1, 2.4)  # inches
+_MOST = 24  # values of an axis of ranks
 _DOT = 6.8  # diameter of a full dot [points]
 _SHOWN = {"rad": ("°", 180.0 / np.pi), "m": ("mm", 1e3)}  # unit of a column -> unit on an axis, and the factor
 
 
 def condition_map(name: str, title: str, caption: str, table: Table, x: str, y: str, *split: str,
-                  ranked: bool = False, words: Mapping[str, str] = MappingProxyType({})) -> Figure:  # fmt: skip
+                  words: Mapping[str, str] = MappingProxyType({})) -> Figure:  # fmt: skip
     """Draw the outcomes over the columns x and y, in one panel for every combination of the columns in `split`.
 
-    ranked : whether x shows ranks, with a tick for each value, so that close values are drawn apart
+    An axis of few values shows their ranks, with a tick for each value, so that close values are drawn apart.
+
     words : the words for a text in the heading of a panel
     """
     units = {column.key: _SHOWN.get(column.unit, (column.unit, 1.0)) for column in table.columns}
     titles = {key: f"{key} [{unit}]" if unit else key for key, (unit, _) in units.items()}
-    ticks, drawn = sorted(set(table.column(x))), []
+    ranks, drawn = {key: sorted(set(table.column(key))) for key in (x, y)}, []
     panels: dict[str, dict[tuple[float, float], list[bool | None]]] = {}
     for row, held in zip(table.records(), table.holds, strict=True):
         panel = ", ".join(words.get(row[key], row[key]) if isinstance(row[key], str) else
                           f"{titles[key]}: {units[key][1] * row[key]:.3g}" for key in split)  # fmt: skip
-        place = float(ticks.index(row[x])) if ranked else units[x][1] * row[x], units[y][1] * row[y]
-        panels.setdefault(panel, {}).setdefault(place, []).append(held)
+        at = {key: units[key][1] * row[key] if len(ranks[key]) > _MOST else float(ranks[key].index(row[key]))
+              for key in (x, y)}  # fmt: skip
+        panels.setdefault(panel, {}).setdefault((at[x], at[y]), []).append(held)
     for number, (panel, places) in enumerate(panels.items()):
         marks: dict[tuple[str, float], list[tuple[float, float]]] = {}  # outcome and size -> places
-        for at, trials in places.items():
+        for place, trials in places.items():
             decided = [held for held in trials if held is not None]
             share = float(np.mean(decided)) if decided else 0.0
             if share < 1.0:
-                marks.setdefault(("fails", 6.0) if decided else ("cannot tell", 5.0), []).append(at)
+                marks.setdefault(("fails", 6.0) if decided else ("cannot tell", 5.0), []).append(place)
             if share > 0.0:
-                marks.setdefault(("holds", _DOT * share**0.5), []).append(at)
+                marks.setdefault(("holds", _DOT * share**0.5), []).append(place)
         with Plot(f"{name}-{number}", _SIZE) as plot:
             for (outcome, size), found in marks.items():
                 plot.marks(found, OUTCOMES[outcome], markersize=size, zorder=4 if outcome == "fails" else 3)
             plot.axes.margins(0.08)
             plot.axes.set(xlabel=titles[x], ylabel=titles[y])
-            if ranked:
-                plot.axes.set_xticks(range(len(ticks)), [f"{units[x][1] * tick:.2g}" for tick in ticks], rotation=90)
+            for axis, key, turn in (("x", x, 90), ("y", y, 0)):
+                shown = [units[key][1] * value for value in ranks[key]]
+                if len(shown) <= _MOST:
+                    named = [f"{float(f'{value:.{2 + (value >= 100)}g}'):.7g}" for value in shown]
+                    plot.axes.set(**{f"{axis}lim": (-0.6, len(shown) - 0.4)})
+                    getattr(plot.axes, f"{axis}axis").set_ticks(range(len(shown)), named, rotation=turn)
         outcomes = [held for trials in places.values() for held in trials]
         told = (f"Map over {titles[x]} and {titles[y]}: the claim holds in {outcomes.count(True)} of "
                     f"{len(outcomes)} trials, fails in {outcomes.count(False)}.")  # fmt: skip

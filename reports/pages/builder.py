@@ -142,7 +142,7 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
         f"error of the ideal path. IAPB is closest in {', '.join(counts)}."
     )
     return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
-                         "part", ranked=True, words=NAMED)
+                         "part", words=NAMED)
 
 
 def played(figures: Mapping[str, Sequence[Figure]]) -> dict[str, str]:

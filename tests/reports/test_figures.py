@@ -225,7 +225,7 @@ def test_penetration_is_that_of_the_deepest_contact(gallery: Gallery) -> None:
 def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes() -> None:
     table = replace(titled(("x", "y"), [(0, 0), (1e-3, 0), (1e-3, 0)]), holds=(True, False, True))
     panel = condition_map("m", "t", "c", table, "x", "y").panels[0]
-    assert "2 of 3" in panel.alt and "0.0002" in re.findall(r">([\d.]+)</text>", panel.svg)
+    assert "2 of 3" in panel.alt and "0.001" in re.findall(r">([\d.]+)</text>", panel.svg)
     assert not re.search(r'="[^"]*\d\.\d{3}', panel.svg)  # coordinates are rounded
 
 
