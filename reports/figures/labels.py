@@ -44,7 +44,7 @@ def name_curves(axes: Any, words: Mapping[str, str] = MappingProxyType({})) -> N
     if len(lines) < 2:
         return
     sheet = _Sheet(axes)
-    for name, line in lines.items():
+    for name, line in sorted(lines.items(), key=lambda found: -len(found[0] + words.get(found[0], ""))):
         path = sheet.along(line)
         if len(path) and not any(text.startswith(name) for text in named):
             own = path[:: max(len(path) // _PLACES, 1)]

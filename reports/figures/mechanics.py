@@ -7,6 +7,7 @@ conserve both, but their outcomes differ nevertheless, because the choice of row
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from reports.figures.figure import Drawn, Panel, recipe
@@ -82,6 +83,7 @@ def tumbling_drift(numbers: Table) -> Drawn:
                 start, order = rows[0], rows[0]["declared order"]
                 plot.curve([(row["step"], start[column] * (row["step"] / start["step"]) ** order) for row in rows],
                            LineStyle(look.color, "", BOUND.dash, 1.2))  # fmt: skip
+            plot.axes.margins(0.06)
             plot.log("step [s]", label)
         ends = "; ".join(f"{look.name} {rows[0][column]:.1e} to {rows[-1][column]:.1e}" for look, rows in series)
         panels.append(Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name))
@@ -111,6 +113,7 @@ def socket_collisions(times: Table, counts: Table) -> Drawn:
                 mine = here.where(filters=setting)
                 time, value = [0.0, *mine.column("time"), _DURATION], [0.0, *mine.column(column)]
                 look = line_arguments(style, marked=bool(mine.rows)) | {"markevery": 4, "clip_on": False}
+                look["gid"] = look["gid"] if mine.rows else None  # the note below names it
                 plot.axes.step(time, [*value, value[-1]], where="post", **look)
             plot.axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, _DURATION))
             plot.axes.set_ylim(bottom=0.0)
@@ -214,7 +217,7 @@ def _balls(problem: str, found: Sequence[Outcome]) -> str:
                 axes.add_patch(Circle(center, 0.5, facecolor=PAPER, edgecolor=MUTED, linewidth=1.0, zorder=2))
                 if max(abs(v) for v in velocity) > ROUNDING:
                     arrow(axes, center, [1.6 * v for v in velocity], color=color, width=1.8, head=10.0)
-            note(axes, (middle, up[1] - 0.45), outcome.label, color=color, fontsize=8.5)
+            note(axes, (middle, up[1] - 0.45), outcome.label, color=color, fontsize=8.5, gid="name=")
             changed = [f"{name} changed ×{change:.2g}" for name, change in zip(("energy", "momentum"), outcome[3:],
                        strict=True) if abs(change) >= ROUNDING]  # fmt: skip
             note(axes, (middle, up[0] + 0.3), ", ".join(changed) or "all kept", color=FORCE if changed else INK,
@@ -232,11 +235,8 @@ def _last_ball(numbers: Table) -> str:
     with Plot("linked-impacts-last") as plot:
         for (treatment, rows), found in series.items():
             look, values = found[0].look, [outcome.velocity[-1][0] for outcome in found]
-            plot.curve(zip([len(outcome.velocity) for outcome in found], values, strict=True), look)
             words = rows.removesuffix(" contacts").removesuffix(" along the row")
-            mine = "per-body rows" if "per-body" in treatment else words
-            falling = 0.1 < values[-1] < values[0]  # its name stands clear of it below
-            lift = (0, -9) if "per-body" in treatment or falling else (0, 8)
-            note(plot.axes, (len(found[-1].velocity), values[-1]), mine, lift, ha="right", color=look.color, fontsize=8)
+            mine = replace(look, name="per-body rows" if "per-body" in treatment else words)
+            plot.curve(zip([len(outcome.velocity) for outcome in found], values, strict=True), mine)
         plot.axes.set(xlabel="balls in the cradle", ylabel="velocity of the last ball [m/s]", ylim=(-0.18, 1.2))
     return plot.svg

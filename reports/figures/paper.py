@@ -113,7 +113,7 @@ def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
         for (name, distance), color in zip(CONTACTS.items(), (BLUE, VERMILION), strict=True):  # opposite to the motion
             point, normal = poses[1].of((distance, 0.0)), -poses[1].rotation[:2, 1]
             arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
-            note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right")
+            note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right", gid="name=")
     words = ", ".join(f"{name} is {distance} m along the second link" for name, distance in CONTACTS.items())
     return Drawn([Panel(canvas.svg, f"Two links in a straight line from a fixed pivot; {words}.")])
 
@@ -127,7 +127,8 @@ def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
             for reading, kinetic in zip(READINGS, ("7/3", "5"), strict=True):
                 before = energies[f"{reading}, KE0"]
                 plot.axes.plot(e, before, **line_arguments(BOUND))
-                plot.axes.plot(e, energies[f"{reading}, {contact}"], **line_arguments(STYLES[reading]), markevery=5)
+                plot.axes.plot(e, energies[f"{reading}, {contact}"], **line_arguments(STYLES[reading]), markevery=5,
+                               clip_on=False)
                 note(plot.axes, (0.0, before[0]), f"KE₀ = {kinetic} J", (2, 4), fontsize=8.5, ha="left", va="baseline")
             plot.axes.set(xlim=(0, 1), ylim=(0, 6), xlabel="coefficient of restitution e", ylabel="KE [J]")
         rods, masses = (energies[f"{reading}, {contact}"][0] for reading in READINGS)

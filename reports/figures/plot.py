@@ -175,14 +175,14 @@ class Canvas(Plot):
     def named_arrow(self, start: Floats, vector: Floats, name: str) -> None:
         """Draw an arrow and its name, which is placed where nothing is drawn yet."""
         arrow(self.axes, start, vector)
-        note_beside(self.axes, start, start + vector, name, 9, color=FORCE)
+        note_beside(self.axes, start, start + vector, name, 10, color=FORCE)
 
     def scale_bar(self, start: tuple[float, float], length: float, text: str) -> None:
         """Draw a scale bar to the right of `start`, with its text above it."""
         right = np.sign(np.subtract(*self.axes.get_xlim()[::-1]))
         ends = np.array([start, (start[0] + right * length, start[1])])
         self.axes.plot(*ends.T, color=MUTED, linewidth=1.4, solid_capstyle="butt", zorder=7)
-        note(self.axes, ends.mean(axis=0), text, (0, 6), color=MUTED, fontsize=8.5)
+        note(self.axes, ends.mean(axis=0), text, (0, 6), fontsize=8.5)
 
 
 def arrow(axes: Any, tail: Any, vector: Any, *, color: str = FORCE, width: float = 1.6, head: float = 9.0) -> None:

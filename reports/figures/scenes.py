@@ -108,8 +108,8 @@ def scenes_ledger(contacts: Table, over_time: Table) -> Drawn:
             fact, place = facts[strip.scene], bottom + 0.55 * row
             space = "in space, " if fact["dimensions"] == 3 else ""
             told = f"{format_number(fact['energy exchanged'], 2)} J, {space}{fact['how it ends']}"
-            plot.drawing.text(0.006, place, strip.scene.replace("_", " "), va="bottom", fontsize=9)
-            plot.drawing.text(0.006, place, told, va="top", fontsize=7.5, color=MUTED)
+            plot.drawing.text(0.006, place + 0.06 * row, strip.scene.replace("_", " "), va="bottom", fontsize=9)
+            plot.drawing.text(0.006, place - 0.04 * row, told, va="top", fontsize=7.5, color=MUTED)
             _energy(energy, strip)
             value, (low, high) = fact["most penetration"], np.log10(_DEPTHS)
             length = max(np.log10(value) - low, 0.0) / (high - low) if value > 0.0 else 0.0
