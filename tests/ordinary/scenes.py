@@ -416,6 +416,11 @@ add_standing("coin_under_book", scene(1.0, [box("coin", (0.025, 0.002), 0.005, (
                                             box("book", (0.2, 0.03), 1.0, (0, 0.017, 0))], [FLOOR], 0.5), 0.0125, 2e-4)
 add_standing("balls_under_slab", scene(1.0, [disc(f"ball_{i}", 0.01, 0.002, (0.1 * i - 0.1, 0.01, 0)) for i in range(3)]
                                        + [box("slab", (0.3, 0.02), 5.0, (0, 0.03, 0))], [FLOOR], 0.5), 0.01)
+# The hand carries the weight: nothing moves.
+add_standing("hand_holds_box", scene(1.0, [box("box", (0.1, 0.1), 1.0, (0, 0.2, 0))], [FLOOR],
+                                     hand={"body": "box", "force": [0, G, 0]}))
+add_standing("hand_holds_arm", scene(1.0, [link("upper", 0.5, 1.0), link("lower", 0.5, 1.0, "upper", (0.5, 0.0))],
+                                     hand={"body": "lower", "point": [1 / 6, 0.0], "force": [0, 1.5 * G, 0]}), 0.5)
 SIN, COS = math.sin(math.radians(5)), math.cos(math.radians(5))
 NARROW = [{"name": f"side_{i}", "kind": "half_plane", "point": [0, 0], "normal": [side * COS, SIN]}
           for i, side in enumerate((1, -1))]  # fmt: skip

@@ -180,7 +180,7 @@ def move(world, state, applied):
     if not finite:
         return NOT_FINITE
     if world.conserving:
-        return OK if drift(world, state) else NOT_POSITIVE_DEFINITE
+        return OK if drift(world, state, applied) else NOT_POSITIVE_DEFINITE
     velocity = state.v if world.semi_implicit else state.mean_v
     integrate(world.mechanism, state.start_q, velocity, world.dt, state.q)
     return OK
@@ -208,8 +208,8 @@ def implicit_forces(world, state, touches):
 
 
 @kernel
-def drift(world, state):
-    """Move all trees freely for Δt, then apply the second half of gravity to free trees. False: M not definite."""
+def drift(world, state, applied):
+    """Move all trees freely for Δt, then apply the second half of gravity to falling trees. False: M not definite."""
     m, free = world.mechanism, world.free
     if not (free.turning and world.switches.velocity_terms):
         integrate(m, state.start_q, state.v, world.dt, state.q)
@@ -225,7 +225,7 @@ def drift(world, state):
             if not swing(world, state, world.dt / parts):
                 return False
     if world.switches.gravity:
-        pull_free_trees(world, state)
+        pull_falling_trees(world, state, applied)
     return True
 
 
@@ -281,24 +281,36 @@ def swing(world, state, h):
 
 
 @kernel
-def pull_free_trees(world, state):
-    """Add half a step of gravity to the velocity of trees without contact; the other half acted before they moved."""
+def falls(world, state, applied, t):
+    """Return whether tree t is free of contact and, with implicit contact, of the hand and the coupling.
+
+    Only where gravity acts alone is it split in halves: a force that holds a weight would move it by half a step.
+    """
+    alone = state.state_of_tree[t] == FREE
+    for k in range(world.tree_start[t], world.tree_stop[t] if world.implicit else 0):
+        alone = alone and applied[k] == 0.0
+    return alone
+
+
+@kernel
+def pull_falling_trees(world, state, applied):
+    """Add half a step of gravity to the velocity of falling trees; the other half acted before they moved."""
     some = False
     for t in range(world.tree_start.shape[0]):
-        some = some or state.state_of_tree[t] == FREE
+        some = some or falls(world, state, applied, t)
     if not some:
         return
     forward_kinematics(world.mechanism, state.q, state.body)
     gravity(world.mechanism, state.body, world.gravity, state.bias)
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.bias, state.bias)
-    add_to_free_trees(world, state, state.v, -0.5 * world.dt)
+    add_to_falling_trees(world, state, applied, state.v, -0.5 * world.dt)
 
 
 @kernel
-def add_to_free_trees(world, state, vector, factor):
-    """Do vector += factor · `bias` for the trees without contact."""
+def add_to_falling_trees(world, state, applied, vector, factor):
+    """Do vector += factor · `bias` for the falling trees."""
     for t in range(world.tree_start.shape[0]):
-        if state.state_of_tree[t] == FREE:
+        if falls(world, state, applied, t):
             start, stop = world.tree_start[t], world.tree_stop[t]
             add_multiple(vector[start:stop], factor, state.bias[start:stop])
 
@@ -360,7 +372,7 @@ def accelerate(world, state, applied, stage):
         gravity(world.mechanism, state.body, world.gravity, state.bias)
         add_multiple(a, -1.0, state.bias)
         if world.conserving:
-            add_to_free_trees(world, state, a, 0.5)
+            add_to_falling_trees(world, state, applied, a, 0.5)
     if world.switches.velocity_terms and not world.conserving:
         bias(world.mechanism, state.body, state.v, state.bias)
         add_multiple(a, -1.0, state.bias)
