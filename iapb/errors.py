@@ -14,7 +14,10 @@ _LISTED_MISTAKES = 100  # a message lists no more; the error itself has all
 
 def shown(value: Any) -> str:
     """Return a short one-line rendering of a value for an error message."""
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # too deep, or a __repr__ of a user
+        text = object.__repr__(value)
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 

@@ -174,9 +174,7 @@ class Simulation:
         if self.system.tool_tree < 0:
             raise ArgumentError("hand_force", hand_force, f"None: scene {self.scene.name} has no hand")
         given = real_numbers(hand_force)
-        force = np.zeros(0)
-        with suppress(OverflowError):  # a whole number that no double reaches is not finite here
-            force = force if given is None else given.astype(np.float64)
+        force = np.zeros(0) if given is None else given.astype(np.float64)
         if force.shape not in ((3,), (6,)) or not np.all(np.isfinite(force)):
             raise ArgumentError("hand_force", hand_force, "3 (plane) or 6 (space) finite numbers")
         self._planned, self.port.wrench[:] = False, 0.0
@@ -362,6 +360,7 @@ def _check_memory(each: int, steps: int, most: float | None) -> None:
 
 
 def _bytes(count: float) -> str:
+    count = min(count, 1e300)  # a whole number may have any size
     power = min(int(math.log10(max(count, 1.0)) // 3), 6)
     return f"{count / 1e3**power:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB', 'PB', 'EB')[power]}"
 

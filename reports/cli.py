@@ -17,7 +17,7 @@ from typing import Any, cast
 
 import typer
 
-from iapb.errors import ArgumentError, IapbError, RunFileError, harmless
+from iapb.errors import ArgumentError, IapbError, RunFileError, harmless, name_the_extra
 
 # command -> its line in `iapb --help`. The module of that name in reports.commands has a function with the same name.
 # Only the module of the given command is imported; `iapb --help` imports none.
@@ -174,8 +174,9 @@ def _status(given: list[str]) -> int:
         return _app(given)(args=given, prog_name="iapb", standalone_mode=False) or 0
     except (KeyboardInterrupt, typer.Abort):
         status, said = 130, STOPPED
-    except (IapbError, OSError) as error:
-        if "--debug" in given:
+    except (IapbError, OSError, ModuleNotFoundError) as missing:
+        error = name_the_extra(missing, "The command") if isinstance(missing, ModuleNotFoundError) else missing
+        if "--debug" in given or not isinstance(error, IapbError | OSError):
             raise
         status, said = 1, str(error)
         if isinstance(error, RunFileError):  # a file's name may hold line ends

@@ -6,6 +6,7 @@ its numbers and the answers of the resolver, and in the FCLIB format.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,6 +37,7 @@ from verification.laws.equality import LAWS, UNEQUAL_LAWS
 from verification.laws.trajectories import judge_run
 
 ENGINE = "iapb:resolve_impact"
+WRONG = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)  # what a forged record raises
 BOUNDS = ("FACTORED", "KIT")  # tolerances, by their names in verification.laws.bounds
 
 
@@ -107,21 +109,27 @@ def read_counterexample(path: Path) -> dict[str, Any] | None:
         if record["part"] not in PARTS or request.bounds not in BOUNDS:
             raise ValueError(f"part {record['part']!r}, bounds {request.bounds!r}")
         case = _impact_of(record["case"]) if record["test"] else record["case"]
-        return record | {"request": request, "index": int(record["index"]), "law": str(record["law"]), "case": case}
-    except (TypeError, KeyError, ValueError) as error:
+        texts = {name: str(record.get(name, "")) for name in ("law", "resolver", "statement", "complaint", "test")}
+        numbers = {name: float(record[name]) for name in ("value", "tolerance")}
+        after = np.asarray(record.get("velocity_after", []), np.float64)
+        return record | texts | numbers | {"request": request, "index": int(record["index"]), "case": case,
+                                           "velocity_after": after}  # fmt: skip
+    except WRONG as error:
         raise RunFileError(f"{path}: is no counterexample: {error}") from error
 
 
 def _impact_of(told: dict[str, Any]) -> ImpactCase:
     d = len(told["velocity"])
-    shapes = {"mass_matrix": (d, d), "contact_jacobian": (-1, d), "translations": (-1, d), "touching": (-1, d)}
+    shapes = {"mass_matrix": (d, d), "contact_jacobian": (-1, d), "velocity": (d,), "unequal": (-1,),
+              "translations": (-1, d), "touching": (-1, d), "friction": (-1,)}
     return ImpactCase(**told | {name: np.array(value, np.float64).reshape(shapes.get(name, np.shape(value)))
-                                for name, value in told.items() if isinstance(value, list)})  # fmt: skip
+                                for name, value in told.items() if name in shapes or isinstance(value, list)
+                                if value is not None} | {"restitution": float(told["restitution"])})  # fmt: skip
 
 
 def recheck_command(path: Path, resolver: str) -> str:
     """Return the command that checks a counterexample of this resolver again."""
-    return f"iapb verify --recheck {path}" + ("" if resolver == ENGINE else " --allow-code")
+    return f"iapb verify --recheck {shlex.quote(str(path))}" + ("" if resolver == ENGINE else " --allow-code")
 
 
 def recheck(path: Path, allow_code: bool = False) -> Iterator[tuple[str, LawResidual]]:
@@ -153,9 +161,12 @@ def _judged(path: Path, record: dict[str, Any], allow_code: bool) -> tuple[str, 
     request, part, law = record["request"], record["part"], record["law"]
     own = request.resolver == ENGINE or allow_code
     subject = (request if own else replace(request, resolver=ENGINE)).subject()
-    with one_thread():  # as it was found
-        case = record["case"] if record["test"] else drawn(part, record["index"], subject)
-        found = residuals(part, case, subject)[0]
+    try:
+        with one_thread():  # as it was found
+            case = record["case"] if record["test"] else drawn(part, record["index"], subject)
+            found = residuals(part, case, subject)[0]
+    except WRONG as error:
+        raise RunFileError(f"{path}: is no counterexample: {error}") from error
     if law not in found:
         raise RunFileError(f"{path}: is no counterexample: no law {law!r} of {part}")
     if own or part not in (IMPACTS, UNEQUAL):

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from iapb.contact.impact import real_numbers
 from iapb.contact.kernels.passive import gain_signs
 from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
@@ -127,12 +128,13 @@ def _integers(values: ArrayLike) -> tuple[NDArray[np.object_], int]:
 
 def _finite(name: str, values: ArrayLike) -> Floats:
     """Return the values as a contiguous array of doubles."""
-    given = np.asarray(values)
-    if given.dtype.kind not in "biuf" and given.size:
-        raise ArgumentError(name, given.dtype, "real numbers")
-    array = np.ascontiguousarray(given, np.float64)
-    if not np.isfinite(array).all():
-        raise ArgumentError(name, "a number that is not finite", "finite numbers")
+    given = real_numbers(values)
+    if given is None:
+        raise ArgumentError(name, values, "an array of real numbers")
+    with np.errstate(over="ignore"):
+        array = np.ascontiguousarray(given, np.float64)
+    if not np.isfinite(array).all() or (given.dtype == np.longdouble and (array != given).any()):
+        raise ArgumentError(name, "a number that is no finite double", "finite numbers")
     return array
 
 
@@ -140,8 +142,8 @@ def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, **others: ArrayLike) ->
     """Return M (1, d, d) or (n, d, d), v⁻ and the others (n, d), checked."""
     masses, before = _finite("mass_matrix", mass_matrix), np.atleast_2d(_finite("v_minus", v_minus))
     masses = masses[None] if masses.ndim == 2 else masses
-    if before.ndim != 2:
-        raise ArgumentError("v_minus", before.shape, "shape (n, d), or (d,) of one impact")
+    if before.ndim != 2 or len(before) > before.size:
+        raise ArgumentError("v_minus", before.shape, "shape (n, d), or (d,) of one impact, d > 0")
     n, d = before.shape
     vectors = [np.atleast_2d(_finite(name, given)) for name, given in others.items()]
     for name, each in zip(others, vectors, strict=True):

@@ -321,7 +321,12 @@ def real_numbers(value: Any) -> NDArray[Any] | None:
     if isinstance(value, np.ma.MaskedArray):
         return None
     if given.dtype.kind == "O":
-        return given if all(isinstance(x, Real) and not isinstance(x, bool) for x in given.flat) else None
+        if not all(isinstance(x, Real) and not isinstance(x, bool) for x in given.flat):
+            return None
+        try:
+            return given.astype(np.float64)
+        except OverflowError:  # a whole number that no double reaches
+            return np.full(given.shape, np.inf)
     return given if given.dtype.kind in "fiu" else None
 
 
@@ -332,10 +337,7 @@ def _array(name: str, value: Any, dimensions: int) -> Floats:
     given = real_numbers(value)
     if given is None:
         raise ArgumentError(name, value, "an array of real numbers")
-    try:
-        array = given.astype(np.float64, copy=False)
-    except OverflowError:
-        raise ArgumentError(name, value, "an array of finite numbers") from None
+    array = given.astype(np.float64, copy=False)
     if array.ndim != dimensions:
         raise ArgumentError(name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}")
     return np.require(array, requirements=["C", "A", "W"])

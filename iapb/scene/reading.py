@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import fspath
 from os.path import exists, isfile
 from pathlib import Path
 from typing import Any
@@ -87,11 +88,11 @@ def load_scene(path: str | Path) -> Scene:
         the file is not a valid scene; the error lists all mistakes.
     """
     try:
-        if exists(path) and not isfile(path):
+        if exists(path := fspath(path)) and not isfile(path):  # a number would be an open file
             raise ValueError("no regular file")  # a pipe would be waited for
         with open(path, "rb") as file:
             content = file.read(4 * MAX_CHARACTERS + 1)
-    except (OSError, ValueError) as failure:
+    except (OSError, TypeError, ValueError) as failure:
         reason = getattr(failure, "strerror", None) or failure
         raise ArgumentError("path", str(path), f"a readable scene file ({reason})") from failure
     try:

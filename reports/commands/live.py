@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from contextlib import closing, nullcontext
 from dataclasses import asdict
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from iapb.compiling import compiling_told, to_stderr
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, MissingDependencyError, installing
 from iapb.simulation import INTERRUPTED
 from iapb.worlds import find_world
 from reports.commands.run import Rendering, SceneName, Values, scene_given
@@ -49,6 +50,8 @@ def live(
         raise ArgumentError("--rate", rate, "a number of steps per second > 0")
     if not 1.0 <= seconds * rate < LONGEST:
         raise ArgumentError("--seconds", seconds, f"at least one step ({1.0 / rate:g} s), less than {LONGEST:g} s")
+    if view and find_spec("viser") is None:
+        raise MissingDependencyError("viser", "--view", installing("report"))
     source = scene_given(scene, set_)
     out.mkdir(parents=True, exist_ok=True)  # an unusable folder is reported before the run, not after it
     with compiling_told(to_stderr):

@@ -9,7 +9,6 @@ can neither show the page in a frame nor learn its address from it.
 from __future__ import annotations
 
 import hmac
-import logging
 import os
 import secrets
 import time
@@ -51,8 +50,6 @@ def show_in_browser(name: str, scene: Mapping[str, Any], port: int, ready: Conne
     os.nice(_POLITENESS)
     parent, names = os.getppid(), [body["name"] for body in scene["bodies"]]
     window = Window(7 * len(names), name)
-    # A browser opens connections that it never uses; without this, each would print a traceback.
-    logging.getLogger("websockets").setLevel(logging.CRITICAL)
     token = secrets.token_urlsafe(16)
     with _guarded(token), redirect_stdout(StringIO()):  # the loop's process prints the address
         server = viser.ViserServer(host=HOST, port=port, label=f"iapb · {scene['name']}", verbose=False)
@@ -64,6 +61,8 @@ def show_in_browser(name: str, scene: Mapping[str, Any], port: int, ready: Conne
         server.scene.add_mesh_simple(f"/{piece.body or 'world'}/shape{number}", piece.vertices.astype(np.float32),
                                      piece.faces.astype(np.uint32), color=color, flat_shading=True, side="double")
     mouse = Mouse(server, _HANDLE_SIZE * size, is_spatial(scene)) if hand else None
+    for stream in (1, 2):  # what clients send, or not, would be printed with tracebacks
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
     ready.send(f"http://{HOST}:{server.get_port()}/{token}/")
     while os.getppid() == parent:
         started = time.monotonic()
@@ -123,7 +122,7 @@ def allowed(path: str, headers: Any, port: int, token: str) -> bool:
     origins = [[f"http://{name}"] for [name] in names] + ([] if headers.get_all("Upgrade") else [[]])
     word = path.partition("?")[0].split("/")[1:2]
     return (headers.get_all("Host") in names and headers.get_all("Origin") in origins
-            and hmac.compare_digest("".join(word).encode(), token.encode()))  # fmt: skip
+            and hmac.compare_digest("".join(word).encode(errors="replace"), token.encode()))  # fmt: skip
 
 
 def _look(server: Any, scene: Mapping[str, Any]) -> float:

@@ -50,6 +50,8 @@ NEEDS = [("from iapb import simulate; simulate('peg_corner', world='ideal', step
          ("from iapb import simulate; simulate('peg_corner', steps=5).save('never.h5')", "Run.save", "h5py"),
          ("from verification import check_passivity", "verification.check_passivity", "hypothesis"),
          ("from iapb.__main__ import main; print(main())", "iapb: The command", "typer")]
+COMMANDS = {"live peg_corner --view": ("viser", "report"), "inspect run.h5": ("h5py", "reference"),
+            "verify": ("hypothesis", "verify"), "reproduce": ("jinja2", "report"), "prove": ("sympy", "verify")}
 
 
 def test_simulate_and_resolve_need_no_extra_and_what_does_says_which_in_one_sentence() -> None:
@@ -63,6 +65,14 @@ for code in {[code for code, *_ in NEEDS]!r}:
     done = run_without(set(EXTRAS), WORKS + each)
     assert done.stdout == "5 [0.]\n1\n", done.stderr
     assert done.stderr.splitlines() == [TOLD.format(who, package, EXTRAS[package]) for _, who, package in NEEDS]
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_a_command_without_its_extra_ends_before_it_computes_and_names_it(line: str) -> None:
+    package, extra = COMMANDS[line]
+    done = run_without({package}, f"from reports.cli import main; raise SystemExit(main({line.split()!r}))")
+    assert done.returncode == 1 and done.stdout == "", done
+    assert done.stderr == "iapb: " + TOLD.format("The command", package, extra) + "\n"
 
 
 @pytest.mark.parametrize("name", ["reference", "verification", "reports"])

@@ -12,7 +12,7 @@ import pytest
 from iapb.errors import RunFileError
 from reports.campaign import Campaign
 from reports.cli import main
-from reports.counterexamples import CampaignRequest, keep_counterexample, recheck
+from reports.counterexamples import ENGINE, CampaignRequest, keep_counterexample, recheck, recheck_command
 from reports.store.tables import read_record, write_record
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
@@ -69,6 +69,14 @@ def test_a_file_that_names_a_module_does_not_run_it(
     said = capsys.readouterr().out
     assert "by iapb:resolve_impact; trap_of_theirs:resolver, which the file names" in said
     assert not Path("trace").exists() and "trap_of_theirs" not in sys.modules
+    cases = ({"case": broken["case"] | {name: 1e308}} for name in ("mass_matrix", "velocity", "translations"))
+    for wrong in (*cases, {"value": "NaN?"}, {"index": float("inf")}, {"velocity_after": [[1.0], []]},
+                  {"tolerance": {}}, {"test": "", "index": -1}):
+        write_record(Path("evil.h5"), broken | wrong, "evil")
+        with pytest.raises(RunFileError, match="is no counterexample"):
+            list(recheck(Path("evil.h5")))
+        assert main(["inspect", "evil.h5"]) in (0, 1)
+    assert recheck_command(Path("x; touch trace"), ENGINE) == "iapb verify --recheck 'x; touch trace'"
     broken["request"]["bounds"] = "__loader__"
     write_record(Path("evil.h5"), broken, "evil")
     with pytest.raises(RunFileError, match="is no counterexample"):

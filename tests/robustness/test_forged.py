@@ -256,7 +256,9 @@ def test_pipes_and_encodings_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("matrix", "said"), [
     ([[1.0 + 1e-3j, 0.0], [0.0, 1.0]], "mass_matrix = .*real numbers"), ([["1", "0"], ["0", "1"]], "real numbers"),
-    ([[1.0, 2.0], [2.0, 1.0]], "impact 0.*negative"),
+    ([[1.0, 2.0], [2.0, 1.0]], "impact 0.*negative"), ([[1.0, 0.0], [0.0]], "real numbers"),
+    (np.ma.masked_array(np.eye(2), mask=True), "real numbers"), (np.eye(2) + np.longdouble(1e-18), "finite double"),
+    (np.eye(2) * np.longdouble("1e400"), "finite double"),
 ])  # fmt: skip
 def test_impacts_of_no_mass_matrix_are_refused(matrix: Any, said: str) -> None:
     with pytest.raises(ArgumentError, match=said):

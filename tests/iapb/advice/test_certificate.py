@@ -85,8 +85,9 @@ def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize(("change", "argument"), [
     ({"v_plus": [[1.0, 2.0, 3.0]]}, "v_plus"), ({"mass_matrix": np.eye(3)}, "mass_matrix"),
-    ({"v_minus": [[np.nan, 1.0]]}, "not finite"), ({"v_minus": np.ones((1, 1, 2))}, "v_minus"),
-    ({"impulse": [[np.nan, 1.0]]}, "impulse"), ({"impulse": [[1.0]]}, "impulse")])  # fmt: skip
+    ({"v_minus": [[np.nan, 1.0]]}, "no finite double"), ({"v_minus": np.ones((1, 1, 2))}, "v_minus"),
+    ({"impulse": [[np.nan, 1.0]]}, "impulse"), ({"impulse": [[1.0]]}, "impulse"),
+    ({"v_minus": np.ones((9, 0))}, "d > 0")])  # fmt: skip
 def test_wrong_arrays_are_refused_by_name(change: dict[str, object], argument: str) -> None:
     good: dict[str, object] = {"mass_matrix": np.eye(2), "v_minus": [[1.0, 1.0]], "v_plus": [[0.5, 0.5]]}
     with pytest.raises(ArgumentError, match=argument):

@@ -254,9 +254,9 @@ def test_what_is_no_document_is_one_mistake_with_its_line(text: str, line: int, 
 
 
 def test_files_that_cannot_be_read_say_why(tmp_path: Path) -> None:
-    for path in (tmp_path / "absent.yaml", tmp_path):
+    for path in (tmp_path / "absent.yaml", tmp_path, 0, None):  # 0 would be the standard input
         with pytest.raises(ArgumentError, match="^path = "):
-            load_scene(path)
+            load_scene(path)  # type: ignore[arg-type]
     path = tmp_path / "latin.yaml"
     path.write_bytes(b"name: a\ntitle: \xe9\xff\n")
     with pytest.raises(SceneError, match=r"latin.yaml:2:1.*UTF-8"):

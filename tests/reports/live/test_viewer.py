@@ -120,6 +120,14 @@ def test_a_client_that_sends_nonsense_lets_go_and_ends_neither_viewer_nor_hand(v
 def test_it_says_nothing_of_a_connection_that_asks_nothing_nor_of_ctrl_c_nor_of_its_end(peg, capfd):
     shown = Viewer(peg(), port=18090)
     address = shown.start()
+    with connect(address.replace("http:", "ws:").rstrip("/"), origin=address[: address.rindex("/", 0, -1)],
+                 subprotocols=[f"viser-v{viser.__version__}"]) as client:
+        for position in ([[1.0], [2.0, 3.0]], "\x1b[31m", 5):  # viser would print these, with tracebacks
+            client.send(msgspec.msgpack.encode({"type": "TransformControlsUpdateMessage", "name": "/hand",
+                                                "wxyz": (1.0, 0.0, 0.0, 0.0), "position": position}))
+    with socket.create_connection(("127.0.0.1", urlsplit(address).port)) as connection:
+        connection.sendall(b"GET /\xff/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert b"403" in connection.recv(4096).splitlines()[0]
     for sent in (b"", b"neither HTTP nor a web socket\r\n\r\n"):
         with socket.create_connection(("127.0.0.1", urlsplit(address).port)) as connection:
             connection.sendall(sent)
