@@ -82,8 +82,9 @@ def verdict_of_families(holds: Iterable[bool | None]) -> str:
 
 def _recorded_says(table: Table) -> Part:
     gains, impacts = _sums(table)
-    return Part(f"Judged in exact arithmetic, {gains or 'none'} of {impacts:,} impacts in {len(table.rows):,} runs of "
-                "the engine gained energy", "", quantities=(("impacts certified", f"{impacts:,}"),), target="none",
+    return Part(f"Checked afterwards in exact arithmetic, {gains or 'none'} of {impacts:,} impacts in "
+                f"{len(table.rows):,} runs of the engine gained energy", "",
+                quantities=(("impacts certified", f"{impacts:,}"),), target="none",
                 asked="Impacts that gain energy, in all runs", measured=f"{gains or 'none'} of {impacts:,}")
 
 

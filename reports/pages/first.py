@@ -17,8 +17,9 @@ from verification.claims.peg import ALL_THREE, LARGE, closest_at, small_tilts
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
-    "The energy loss in (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. Impulses by (13) "
-    "and (14) do not conserve momentum. Formula (21), computed as printed, can gain energy by rounding."
+    "The energy loss in equations (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. "
+    "Impulses by (13) and (14) do not conserve momentum. Formula (21), computed as printed, can gain energy by "
+    "rounding."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
@@ -68,7 +69,7 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
         if text := " ".join(said for held, said in found if held is wanted):
             told.append(Fact(label, text, "C11" if wanted else "C10", kind))
     if (energy := topics.get("exact-energy")) is not None:
-        told.append(Fact("Is it safe?", f"{energy.answer} {LIMIT}", energy.key,
+        told.append(Fact("Energy", f"{energy.answer} {LIMIT}", energy.key,
                          KINDS[0] if energy.verdict == REPRODUCED else KINDS[4]))  # fmt: skip
     if (rate := topics.get("haptic-rate")) is not None:
         told.append(Fact("Is it fast?", " ".join((*_speed(evidence, rate), rate.answer)), rate.key))
@@ -113,7 +114,8 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
         each = " and ".join(f"{name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
             f"If the pushed body, a peg, starts tilted by at most {degrees(Condition().tilt):.2f}°, impulses bring the "
-            f"hand's path nearer to the path at a rigid wall than both rivals do: {each} starts.")
+            f"hand's path nearer to the path at a rigid wall than springs alone and than a rigid wall felt through a "
+            f"spring: {each} starts that can tell.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -124,7 +126,7 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
         least, most = (f"{end(races['ratio']):.2g}" for end in (min, max))
         yield f"With all bodies at rest, a step takes {least} to {most} times as long as one of the engine MuJoCo."
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
-        yield (f"Lemke's complementarity method is faster than the engine in {raced.holds.count(False)} of the "
+        yield (f"Lemke's complementarity method is faster than our engine in {raced.holds.count(False)} of the "
                f"{len(raced.decided)} tested impacts whose times differ clearly.")
 
 

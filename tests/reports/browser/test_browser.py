@@ -13,7 +13,7 @@ PHONE = (400, 800)
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
 REAL = Path(__file__).parents[3] / "out" / "report.html"
 MOST_PRINTED = 6  # pages of paper for the first page
-ANSWERED = ("Tested", "✓ Holds", "✕ Fails", "✓ Is it safe?", "Known failures", "What next?")  # two screens of a phone
+ANSWERED = ("Tested", "✓ Holds", "✕ Fails", "✓ Energy", "Known failures", "What next?")  # two screens of a phone
 BELOW = """([texts, depth]) => texts.filter((text) => {
     const found = [...document.querySelectorAll(".first dt")]
         .find((part) => part.textContent.replace(/\\s+/g, " ").startsWith(text));
