@@ -28,7 +28,6 @@ from verification import haptic_rate
 from verification.check import Study
 from verification.claims import peg
 from verification.cost import effects
-from verification.cost.steps import compile_parts
 from verification.finding import Failure, Finding, attempt
 from verification.hard_cases.findings import on_hard_cases
 from verification.proofs import on_proofs
@@ -129,7 +128,6 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
         for name in ahead:
             running |= {pool.submit(_slowest_runs, out, depth)} if name == ON_THE_PEG else set()
             running |= {pool.submit(_filled, stages[name], out, depth)}
-        running |= {pool.submit(compile_parts)} if haptic_rate.TOPIC.key in missing else set()
         while running:
             done, running = wait(running, PAUSE, FIRST_COMPLETED)
             stages |= {stage.name: stage for future in done if isinstance(stage := future.result(), Stage)}

@@ -15,7 +15,7 @@ from verification.cost.effects import steps, summary
 from verification.cost.growth import FACTORED, FITTED, SCALING, fitted
 from verification.cost.robots import MANY, ONE, ROBOTS
 from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL
-from verification.cost.steps import BODIES, IDEAL, PROFILE, RACES, START
+from verification.cost.steps import BODIES, IDEAL, RACES, START
 from verification.cost.trajectories import BELOW, MOTIONS, STIFFENED, TIMED_OUT, WORLDS, WORTH, curves, worth
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Finding
 from verification.haptic_rate import BENCH, KERNELS, RATE, SOLVERS, TOPIC, quoting
@@ -87,8 +87,7 @@ def tables() -> Tables:
         _run("MuJoCo", 1.0, 1e-2, 10.0), _run("MuJoCo", 0.1, None, 3e3, "timed out")])  # fmt: skip
     scaled = _times(20.0)
     given = {
-        RACES: _races(0.05), PROFILE: PROFILE.table_of([{"scene": "peg in the corner", "part": "whole step"}]),
-        SCALING: scaled,
+        RACES: _races(0.05), SCALING: scaled,
         FITTED: FITTED.table_of([fitted(scaled, *case) for case in FITTED.cases(None)]),  # type: ignore[arg-type]
         RATE: RATE.table_of([{"coordinates": 3, "most contacts, factored": 600, "most contacts, printed formula": 60}]),
         BODIES: _bodies(20, 100, 200, step=float, tested=int),

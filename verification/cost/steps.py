@@ -1,4 +1,4 @@
-"""Time of a step: against MuJoCo, part by part, over the number of bodies, in each world, and before the first step.
+"""Time of a step: against MuJoCo, over the number of bodies, in each world, and before the first step.
 
 Our loop is `Simulation.advance_chunk`, as in `simulate`, and records every step. MuJoCo's loop is
 `mj_step(model, data, nstep)`, which records nothing. Both run the same number of steps in turns; each round gives one
@@ -22,18 +22,14 @@ from typing import Any
 
 import numpy as np
 
-from iapb.compiled import kernel
 from iapb.contact.kernels.broadphase import near_pairs
-from iapb.contact.kernels.collide import resolve_collisions
-from iapb.contact.kernels.step import clear, find_contacts, locate, move
 from iapb.errors import installing
-from iapb.haptics.rendering import couple, drive_device
-from iapb.recording import Recorder, make_record, write_step
+from iapb.recording import Recorder, make_record
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.simulation import Simulation
 from reference.worlds import find_world
 from verification.check import Check, Study
-from verification.clock import LEAST_ROUNDS, TIMES, limited, seconds, take_turns, time_cells, timed
+from verification.clock import LEAST_ROUNDS, limited, seconds, take_turns, timed
 from verification.cost.growth import power_law, steepest
 from verification.cost.resting import RESTING, RestingScene
 from verification.finding import NOT_COMPUTED, Part
@@ -136,12 +132,6 @@ class OwnLoop:
         simulation.advance_chunk(_record(simulation, self.settling), self.settling)
         return _record(simulation, self.steps)
 
-    def part(self, number: int) -> float:
-        """Return the time of one of PARTS per step [s], on the scene at rest."""
-        simulation, record = self.simulation, self._settled()
-        arguments = simulation.world, simulation.state, simulation.port, record, number, self.steps
-        return timed(lambda: repeat_part(*arguments))[1] / self.steps
-
 
 class _Theirs:
     """The scene in MuJoCo's loop."""
@@ -173,54 +163,6 @@ RACES = Check(
     note="Frictionless (condim 1), with the same masses, forces and step; MuJoCo's other options have default values. "
     "The engine records its steps; MuJoCo does not. Each round of timing gives a ratio; the table has their median and "
     "quartiles. Contacts are means over the timed steps. Drift: largest change of a coordinate while timed, m or rad.",
-)  # fmt: skip
-
-
-# The parts of a step
-
-# in the order in which `repeat_part` numbers them
-PARTS = ("hand and coupling", "bodies placed", "contacts found", "collisions", "forces and motion", "device", "record")
-
-
-@kernel
-def repeat_part(world: Any, state: Any, port: Any, record: Any, part: Any, times: Any) -> None:
-    """Repeat one part of the step `times` times; on a scene at rest all repetitions do the same work."""
-    for k in range(times):
-        if part == 0:
-            couple(world, state, port)
-        elif part == 1:
-            clear(state)
-            locate(world, state)
-        elif part == 2:
-            find_contacts(world, state)
-        elif part == 3:
-            resolve_collisions(world, state)
-        elif part == 4:
-            state.penalty_force[:] = 0.0
-            state.friction_force[:] = 0.0
-            move(world, state, port.applied)
-        elif part == 5:
-            drive_device(world, state, port)
-        else:
-            write_step(record, k, k, state, port)
-
-
-def compile_parts() -> None:
-    """Compile `repeat_part`, which takes as long as a whole step."""
-    OwnLoop(next(iter(RESTING.values())), 1).part(0)
-
-
-def profile(study: Study, name: str) -> list[Row]:
-    """Return the times of the whole step and of each of its parts on a scene at rest."""
-    loop = OwnLoop(RESTING[name], STEPS)
-    parts = {part: partial(loop.part, k) for k, part in enumerate(PARTS)}
-    times = take_turns({"whole step": loop.sample, **parts}, 15 if study.depth == "full" else 7)
-    return [{"scene": name, "part": part, **time_cells(taken)} for part, taken in times.items()]
-
-
-PROFILE = Check(
-    key="parts of a step", question="Where does the time of a step go?", row=profile, timed=TIMES, digits=3,
-    cases=lambda _: RESTING, note="Each part is repeated on its own in compiled code.",
 )  # fmt: skip
 
 
