@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from verification.claims.speed import C19, C22
-from verification.cost.accuracy import BUDGET_ROWS, ORDER_BIAS
+from verification.cost.accuracy import BUDGET_ROWS
 from verification.cost.calls import PRINTED
 from verification.cost.effects import steps, summary
 from verification.cost.growth import FACTORED, FITTED, SCALING, fitted
@@ -66,10 +66,6 @@ def _start(computing: float) -> Table:
                             "processes": 1, "target [s]": 0.5}])  # fmt: skip
 
 
-def _bias(spread: float) -> Table:
-    return ORDER_BIAS.table_of([{"method": "IAPB", "spread [%]": spread}])
-
-
 def _kernels(*ratios: float) -> Table:
     return C22.table_of([{"problem": "pile", "contacts": k, "ratio": ratio, "lower quartile": ratio,
                           "upper quartile": ratio} for k, ratio in enumerate(ratios, 1)])  # fmt: skip
@@ -95,7 +91,7 @@ def tables() -> Tables:
                                  for form in (ONE, MANY)]),
         SOLVERS: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4)), START: _start(0.3),
         BUDGET_ROWS: BUDGET_ROWS.table_of([_budget(budget) for budget in range(5)]),
-        MOTIONS: motions, WORTH: worth(motions, WORLDS), ORDER_BIAS: _bias(4.0),
+        MOTIONS: motions, WORTH: worth(motions, WORLDS),
     }  # fmt: skip
     return {check.key: table for check, table in given.items()} | {KERNELS.key: _kernels(2.0, 3.0)}
 
@@ -122,7 +118,6 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
         ({START.key: _start(0.8)}, "0.8 s of CPU time"),
         ({BODIES.key: _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2"),
         ({BODIES.key: _bodies(20, 200, step=float, tested=lambda n: n * n)}, "tested pairs"),
-        ({ORDER_BIAS.key: _bias(14.0)}, "IAPB by 14 %"),
         ({BUDGET_ROWS.key: BUDGET_ROWS.table_of([_budget(2, gain=1e-16)])}, "adds energy in 1 of 1"),
     ],
 )

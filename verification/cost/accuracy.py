@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -23,7 +22,7 @@ from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
 from verification.check import Check, Study
-from verification.clock import limited, sampler, seconds, take_turns, target
+from verification.clock import sampler, seconds, take_turns, target
 from verification.cost import calls
 from verification.cost.calls import PRINTED, Call
 from verification.cost.problems import random_impact
@@ -339,48 +338,6 @@ def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:
     return titled(("contacts", "problem", "solver", "work", "time [µs]", "IAPB [µs]", "ratio"), lost, digits=3,
                   timed=("time [µs]", "IAPB [µs]", "ratio"), timed_rows=True)
 
-
-BIAS, LARGEST_BIAS = (4, 3), 10.0  # (contacts, coordinates) of the impact; [%] target
-
-
-def order_bias(study: Study, rounds: int) -> Iterator[Row]:
-    """Yield a row per method, timed right after each other method: with a fair clock the order does not matter."""
-    problem = timed_problems(*BIAS)[4]
-    made: dict[str, Call] = {}
-    for way in WAYS:
-        with suppress(MissingDependencyError):
-            made[way.method] = way.make(problem)
-    timers = {method: sampler(call) for method, call in made.items()}
-
-    def after(before: str, method: str) -> float:
-        made[before]()
-        return timers[method]()
-
-    pairs = [(before, method) for method in made for before in made if before != method]
-    times = take_turns({pair: partial(after, *pair) for pair in pairs}, rounds)
-    for method in made:
-        others = [before for before in made if before != method]
-        samples = np.array([times[before, method].samples for before in others])
-        middles = np.median(samples / np.median(samples, axis=0), axis=1)  # a slowdown affects a whole round
-        low, high = int(np.argmin(middles)), int(np.argmax(middles))
-        typical = 1e6 * float(np.median(samples))
-        yield {"method": method, "least [µs]": typical * float(middles[low]), "after": others[low],
-               "most [µs]": typical * float(middles[high]), "then after": others[high],
-               "spread [%]": 100.0 * float(middles[high] / middles[low] - 1.0)}
-
-
-def _bias_says(table: Table) -> Part:
-    worst = max(table.records(), key=lambda row: float(row["spread"]))
-    return limited(f"the order of timing changes the time of {worst['method']} by", worst["spread"], LARGEST_BIAS, " %",
-                   ", the most of all methods")
-
-
-ORDER_BIAS = Check(
-    key="order bias", question="Does the time of a method depend on the method before it?", cases=lambda _: (25,),
-    row=order_bias, says=_bias_says, timed=("least", "after", "most", "then after", "spread"), digits=3,
-    note="Impacts with {} contacts and {} coordinates. The median of 25 rounds, relative to the median of each round. "
-    "“After” names the method that was timed just before.".format(*BIAS),
-)  # fmt: skip
 
 TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
 

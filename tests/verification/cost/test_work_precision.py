@@ -10,7 +10,6 @@ import pytest
 from iapb import ArgumentError
 from reports.commands.bench import seconds_of
 from verification import which_method
-from verification.check import Study
 from verification.cost import accuracy, calls
 from verification.cost.accuracy import (
     ACCURACY,
@@ -24,7 +23,6 @@ from verification.cost.accuracy import (
     choices,
     choose,
     lost_to_rivals,
-    order_bias,
     work_precision,
 )
 from verification.cost.calls import daqp_call, kernel_call
@@ -142,7 +140,6 @@ def test_a_solver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(calls, "import_lcp_lemke", missing)
     found = work_precision([(1, 3)], 3, [way for way in WAYS if way.method == accuracy.LEMKE])
     assert all("quantecon" in outcome for outcome in found.column("outcome"))
-    assert accuracy.LEMKE not in [row["method"] for row in order_bias(Study(), 3)]
 
 
 def test_a_size_is_measured_when_asked_for() -> None:
