@@ -16,7 +16,7 @@ from verification.cost.accuracy import BUDGET_ROWS
 from verification.cost.growth import FITTED, SCALING, TITLES, most_contacts, printed_over_factored
 from verification.cost.robots import ROBOTS
 from verification.cost.solvers import IMPACT_TIMES, faster, solvers_say
-from verification.cost.steps import BODIES, RACES, START
+from verification.cost.steps import BODIES, RACES
 from verification.cost.trajectories import MOTIONS, WORTH
 from verification.finding import NOT_COMPUTED, REPRODUCED, Finding, Part
 from verification.table import Row, Table
@@ -61,7 +61,7 @@ BENCH = Topic(
     question="A haptic loop must finish each step within a millisecond. This page compares the engine's times with "
     "those of MuJoCo, Pinocchio, the printed formula and complementarity solvers. The programs are timed in turns "
     "within one run, because ratios of times depend less on the machine than times.",
-    checks=(RACES, SCALING, KERNELS, SOLVERS, FITTED, RATE, BODIES, ROBOTS, START, MOTIONS, WORTH, BUDGET_ROWS),
+    checks=(RACES, SCALING, KERNELS, SOLVERS, FITTED, RATE, BODIES, ROBOTS, MOTIONS, WORTH, BUDGET_ROWS),
     says=_answer,
 )  # fmt: skip
 TOPIC = replace(BENCH, checks=tuple(check for check in BENCH.checks if check.key not in QUOTED))

@@ -15,7 +15,7 @@ from verification.cost.effects import steps, summary
 from verification.cost.growth import FACTORED, FITTED, SCALING, fitted
 from verification.cost.robots import MANY, ONE, ROBOTS
 from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL
-from verification.cost.steps import BODIES, IDEAL, RACES, START
+from verification.cost.steps import BODIES, IDEAL, RACES
 from verification.cost.trajectories import BELOW, MOTIONS, STIFFENED, TIMED_OUT, WORLDS, WORTH, curves, worth
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Finding
 from verification.haptic_rate import BENCH, KERNELS, RATE, SOLVERS, TOPIC, quoting
@@ -61,11 +61,6 @@ def _budget(budget: int, gain: float = 0.0) -> Any:
             "largest residual": 0.2, "share of the loss": budget / 4, "largest relative gain": gain}  # fmt: skip
 
 
-def _start(computing: float) -> Table:
-    return START.table_of([{"what": "iapb --help", "on the wall [s]": computing + 0.1, "computing [s]": computing,
-                            "processes": 1, "target [s]": 0.5}])  # fmt: skip
-
-
 def _kernels(*ratios: float) -> Table:
     return C22.table_of([{"problem": "pile", "contacts": k, "ratio": ratio, "lower quartile": ratio,
                           "upper quartile": ratio} for k, ratio in enumerate(ratios, 1)])  # fmt: skip
@@ -89,7 +84,7 @@ def tables() -> Tables:
         BODIES: _bodies(20, 100, 200, step=float, tested=int),
         ROBOTS: ROBOTS.table_of([{"robot": "arm", "quantity": "bias", "form": form, "ratio": 0.9}
                                  for form in (ONE, MANY)]),
-        SOLVERS: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4)), START: _start(0.3),
+        SOLVERS: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4)),
         BUDGET_ROWS: BUDGET_ROWS.table_of([_budget(budget) for budget in range(5)]),
         MOTIONS: motions, WORTH: worth(motions, WORLDS),
     }  # fmt: skip
@@ -115,7 +110,6 @@ def test_what_is_as_asked_for_is_said_to_be(tables: Tables) -> None:
         ({SCALING.key: _times(5.0)}, "takes 5 times"),
         ({SOLVERS.key: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-5))}, "daqp on the patch at 4 contacts"),
         ({KERNELS.key: _kernels(2.0, 0.5, 1.0)}, "faster than Lemke's method in 1 of the 2 impacts"),
-        ({START.key: _start(0.8)}, "0.8 s of CPU time"),
         ({BODIES.key: _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2"),
         ({BODIES.key: _bodies(20, 200, step=float, tested=lambda n: n * n)}, "tested pairs"),
         ({BUDGET_ROWS.key: BUDGET_ROWS.table_of([_budget(2, gain=1e-16)])}, "adds energy in 1 of 1"),

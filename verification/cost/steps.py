@@ -1,4 +1,4 @@
-"""Time of a step: against MuJoCo, over the number of bodies, in each world, and before the first step.
+"""Time of a step: against MuJoCo, over the number of bodies and in each world.
 
 Our loop is `Simulation.advance_chunk`, as in `simulate`, and records every step. MuJoCo's loop is
 `mj_step(model, data, nstep)`, which records nothing. Both run the same number of steps in turns; each round gives one
@@ -8,16 +8,9 @@ ratio. All solvers of MuJoCo are timed, and the fastest solver of each form coun
 from __future__ import annotations
 
 import math
-import os
-import resource
-import subprocess
-import sys
-import tempfile
-import time
 from collections.abc import Iterator
 from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -272,54 +265,4 @@ def seconds_per_step(scene_name: str, way: str) -> float:
 STEP_TIMES = Check(
     key="time per step", question="", cases=lambda _: ("peg_corner", "peg_hole"), row=step_in_each_world,
     timed=("median", "least", "largest"), digits=3,
-)  # fmt: skip
-
-
-# Before the first step
-
-HELP_LIMIT, COMPILE_LIMIT = 0.5, 30.0  # [s]
-HELP, FIRST = "iapb --help", "first steps"
-_HELPS = 5
-# one step in the plane and one in space; the second uses kernels that the first compiled
-_FIRST_STEPS = (
-    "from iapb import find_scene, load_scene, simulate\n"
-    "for name in ('peg_corner', 'arm_obstacles'):\n"
-    "    simulate(load_scene(find_scene(name)), steps=1)\n"
-)
-
-
-def start_up(study: Study, what: str) -> Iterator[Row]:
-    """Time `iapb --help`, or the first steps without and with a cache of compiled kernels."""
-
-    with tempfile.TemporaryDirectory() as cache:
-        if what == HELP:
-            helps = [process_time(["-m", "reports.cli", "--help"], {}) for _ in range(_HELPS)]
-            found = {HELP: (np.median(helps, axis=0), _HELPS, HELP_LIMIT)}
-        else:
-            both = [np.array(process_time(["-c", _FIRST_STEPS], {"NUMBA_CACHE_DIR": cache})) for _ in range(2)]
-            found = {"first steps, all kernels compiled": (both[0] - both[1], 1, COMPILE_LIMIT),
-                     "first steps, kernels from the cache": (both[1], 1, COMPILE_LIMIT)}  # fmt: skip
-    for name, (spent, processes, limit) in found.items():
-        yield {"what": name, "on the wall [s]": float(spent[0]), "computing [s]": float(spent[1]),
-               "processes": processes, "target [s]": limit}  # fmt: skip
-
-
-def process_time(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:
-    """Return wall and CPU time [s] of a Python process in the project's folder."""
-    before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run([sys.executable, *arguments], cwd=Path(__file__).parents[2], env={**os.environ, **environment},
-                   check=True, stdout=subprocess.DEVNULL)  # fmt: skip
-    wall, after = time.perf_counter() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
-    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
-def _start_says(table: Table) -> Iterator[Part]:
-    for row in table.records():
-        yield limited(f"the wait for {row['what']} is", row["computing"], row["target"], " s of CPU time",
-                      f", {row['on the wall']:.2f} s of wall time")  # fmt: skip
-
-
-START = Check(
-    key="start", question="How long is the wait before the first step?", row=start_up, says=_start_says, digits=3,
-    cases=lambda study: (HELP, FIRST) if study.depth == "full" else (HELP,), timed=("on the wall", "computing"),
 )  # fmt: skip
