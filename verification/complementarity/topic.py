@@ -17,7 +17,6 @@ from verification.complementarity.extensions import BAR, FRICTION, UNEQUAL
 from verification.complementarity.piles import piles
 from verification.complementarity.solvers import OWN, SOLVER_LIST, collections
 from verification.cost.solvers import IMPACT_TIMES
-from verification.cost.steps import STEP_TIMES
 from verification.finding import REPRODUCED, Part
 from verification.mechanics.against_pinocchio import scene_difference
 from verification.table import Row, Table
@@ -44,7 +43,7 @@ def complementarity(folders: Mapping[str, Path], worlds: Iterable[str] = ()) -> 
         "from the problem, are small. Velocities after the impact are compared in the kinetic metric, relative to "
         "|v⁻|.",
         checks=(MAP, TWO_CONTACTS, piles(folders.values()), FRICTION, UNEQUAL, BAR, CONVERGENCE, REFERENCES,
-                IMPACT_TIMES, STEP_TIMES, *collections({OWN: None, **folders}), LAW_LIST, SOLVER_LIST,
+                IMPACT_TIMES, *collections({OWN: None, **folders}), LAW_LIST, SOLVER_LIST,
                 *([_world_list(worlds)] if worlds else [])),
         says=_answer,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Time of a step: against MuJoCo, over the number of bodies and in each world.
+"""Time of a step against MuJoCo, and over the number of bodies.
 
 Our loop is `Simulation.advance_chunk`, as in `simulate`, and records every step. MuJoCo's loop is
 `mj_step(model, data, nstep)`, which records nothing. Both run the same number of steps in turns; each round gives one
@@ -18,15 +18,16 @@ import numpy as np
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.errors import installing
 from iapb.recording import Recorder, make_record
-from iapb.scene import find_scene, load_scene, scene_from_text
+from iapb.scene import scene_from_text
 from iapb.simulation import Simulation
-from reference.worlds import find_world
 from verification.check import Check, Study
-from verification.clock import LEAST_ROUNDS, limited, seconds, take_turns, timed
+from verification.clock import limited, take_turns, timed
 from verification.cost.growth import power_law, steepest
 from verification.cost.resting import RESTING, RestingScene
 from verification.finding import NOT_COMPUTED, Part
 from verification.table import Row, Table
+
+IDEAL = "ideal (QP per step)"  # in tables of times
 
 
 class RecordedLoop:
@@ -230,39 +231,4 @@ def _bodies_say(table: Table) -> Iterator[Part]:
 BODIES = Check(
     key="bodies", question="How does the time of a step grow with the number of free bodies?", cases=lambda _: COUNTS,
     row=step_of_bodies, says=_bodies_say, timed=("step",), digits=3,
-)  # fmt: skip
-
-
-# The worlds
-
-COMPILED, STEPPED, IDEAL = "IAPB, compiled loop", "IAPB, step by step", "ideal (QP per step)"
-WAYS = (COMPILED, STEPPED, "PB, compiled loop", IDEAL, "CBuc (QP per step)")
-WORLD_STEPS = 256  # half a second of the peg, with free, colliding and resting steps
-WORLD_ROUNDS = {"quick": LEAST_ROUNDS, "full": 7}
-
-
-def step_in_each_world(study: Study, scene: str) -> list[Row]:
-    """Return the time of a step in each world, as a multiple of a step of IAPB's compiled loop in the same round."""
-    times = take_turns({way: partial(seconds_per_step, scene, way) for way in WAYS}, WORLD_ROUNDS[study.depth],
-                       failures=study.failures, name=lambda way: f"{scene}, {way}")  # fmt: skip
-    ratios = {way: each.over(times[COMPILED]) for way, each in times.items()} if COMPILED in times else {}
-    return [{"scene": scene, "world": way, "median": ratio.median, "least": ratio.least, "largest": ratio.largest,
-             "samples": ratio.rounds} for way, ratio in ratios.items()]  # fmt: skip
-
-
-def seconds_per_step(scene_name: str, way: str) -> float:
-    """Return the time of a step [s], compiled or called from Python."""
-    scene, world = load_scene(find_scene(scene_name)), find_world(way.split(",")[0].split(" ")[0])
-    simulation = Simulation(scene, world.law, world.coupling_in(scene))
-    if way == STEPPED:
-        simulation.step()
-        return seconds(simulation.step, WORLD_STEPS)
-    return RecordedLoop(simulation, WORLD_STEPS).sample()
-
-
-# The rigid worlds solve a QP per step from Python, while the engine's worlds are compiled. Therefore IAPB's step is
-# timed in both ways: in the compiled loop, and one step at a time from Python.
-STEP_TIMES = Check(
-    key="time per step", question="", cases=lambda _: ("peg_corner", "peg_hole"), row=step_in_each_world,
-    timed=("median", "least", "largest"), digits=3,
 )  # fmt: skip
