@@ -55,7 +55,7 @@ TERMS: dict[str, tuple[str, str]] = {
     r"[vu]⁻|[vu]⁺|KE[⁻⁺]|γ[⁻⁺]": ("superscripts − and +", "before (−) and after (+) an impact; v is the velocity, "
                                   "KE the kinetic energy, γ the normal velocities at the contacts"),
     r"κ": ("κ", "the condition number of a matrix: how much it amplifies relative errors"),
-    r"ε": ("ε", "the unit roundoff 2⁻⁵³ of double precision"),
+    r"ε": ("ε", "the relative spacing of doubles, 2⁻⁵² = 2.2e-16"),
     r"passiv\w+": ("passive", "gives no energy to whoever holds it: the stored energy never exceeds what was put in"),
     r"factored": ("factored", "the engine's method for one impact: it factors M and projects the velocity with an "
                   "orthonormal basis of the rows"),
