@@ -53,7 +53,7 @@ portable: setup ## tests, runs and report under other BLAS kernels, numpy, libm 
 
 .PHONY: fuzz
 fuzz: setup ## faults done to the store, and 100,000 wrong inputs: each is read or refused by name; TIMES=70 of what tests try
-	@IAPB_FUZZ=$(or $(TIMES),70) $(BIN)/python -m pytest -q tests/robustness/test_faults.py tests/robustness/test_fuzz.py
+	@IAPB_FUZZ=$(or $(TIMES),70) $(BIN)/python -m pytest -q -m '' tests/robustness/test_faults.py tests/robustness/test_fuzz.py
 
 .PHONY: docs
 docs: setup ## the pages of docs/ with the reference of the code, as HTML in out/docs; a warning is an error
@@ -75,9 +75,13 @@ imports: setup ## import-linter: the packages import one way
 pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
 	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q $(PYTEST_ARGS)
 
+.PHONY: thorough
+thorough: setup ## the tests that `make test` leaves out: attacks and kills, a browser, the documents, Coq; CI runs them
+	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q -m thorough $(PYTEST_ARGS)
+
 .PHONY: deep
 deep: setup ## the test suite with long property searches, and the kit on sound resolvers at 100 seeds (hours)
-	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q $(PYTEST_ARGS)
+	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q -m '' $(PYTEST_ARGS)
 
 .PHONY: format
 format: setup ## let ruff repair what it can

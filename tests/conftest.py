@@ -23,6 +23,7 @@ if config.DISABLE_JIT:
     np.seterr(over="ignore", under="ignore", invalid="ignore")  # as silent as in compiled kernels
 
 
+@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in its own hook
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Keep the tests that share what a file makes once on one worker: `make test` runs with --dist loadgroup."""
     for item in items:

@@ -31,8 +31,8 @@ from verification.claims.conditions import IGNORED, Condition
 PICTURES = ROOT / "docs/pictures"
 PACKAGES = ("iapb", "reference", "verification", "reports")
 ADDS_TO_THE_PROJECT = ("docs/extending.md",)
-DOCUMENTS = ("docs/tutorial.md", "docs/extending.md", "README.md", "docs/scenes.md", "docs/resolvers.md",
-             "docs/questions.md")  # fmt: skip
+DOCUMENTS = ("README.md", *(pytest.param(f"docs/{name}.md", marks=pytest.mark.thorough) for name in
+                            ("tutorial", "extending", "scenes", "resolvers", "questions")))  # fmt: skip
 WIDTH = "100"  # of the terminal that the documents show
 
 

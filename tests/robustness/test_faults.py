@@ -14,6 +14,8 @@ from tests.robustness.faults import FAULTS, killed_writer, open_store
 from tests.robustness.inputs import TIMES
 from tests.robustness.kills import COMMANDS, FOREIGN, foreign_hash, killed_command, make_foreign
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_nothing_finished_is_lost(tmp_path: Path, name: str) -> None:

@@ -22,6 +22,8 @@ from reports.store.io import sealed
 from tests.robustness.faults import sample_run
 from tests.robustness.inputs import fclib_files
 
+pytestmark = pytest.mark.thorough
+
 SECRET = b"root:x:0:0:a line of a password file that nobody may see\n" * 4
 ROOT = Path(__file__).parents[2]
 

@@ -34,6 +34,8 @@ from reports.store.parts import Parts
 from tests.robustness.faults import sample_run
 from tests.robustness.inputs import fclib_files, result_files
 
+pytestmark = pytest.mark.thorough
+
 ROOT = Path(__file__).parents[2]
 MOST = 700 << 20  # bytes that a refusal may take beyond what the process had
 

@@ -22,6 +22,8 @@ from hypothesis import strategies as st
 from iapb.errors import IapbError
 from tests.robustness.inputs import KINDS, TIMES, prepare
 
+pytestmark = pytest.mark.thorough
+
 READ, REFUSED, BROKEN = "read", "refused", "broken"
 LONGEST = 20.0  # [s] of this process's own time; a case takes milliseconds, the largest legal file a few seconds
 _MEMORY = 4 << 30  # bytes beyond what the process has: a wrong file may not ask for more

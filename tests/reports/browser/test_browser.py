@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.thorough
+
 PHONE = (400, 800)
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
 REAL = Path(__file__).parents[3] / "out" / "report.html"

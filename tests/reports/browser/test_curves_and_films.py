@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from reports.figures.corner import UNLIMITED
 from reports.figures.film import SIZE, Film, bounds_of
 from reports.figures.geometry import outline
 from reports.pages.records import Evidence
+
+pytestmark = pytest.mark.thorough
 
 READ = """() => [...document.querySelector("#fig07 .readout:not([hidden])").children]
     .map((row) => [row.firstChild.textContent, row.querySelector("b").textContent])"""

@@ -27,6 +27,8 @@ from reports.live.viewer import SpringHand, Viewer
 from reports.live.window import SHOWN, SILENCE_SECONDS, TARGET, WANTED, Window
 from reports.store.keys import content_hash
 
+pytestmark = pytest.mark.thorough
+
 TICKS = 60
 
 

@@ -103,6 +103,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("built")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", files())
 def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, built: Path) -> None:
     source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
