@@ -1,4 +1,4 @@
-"""IAPB against complementarity: where their motions agree, and how the ideal world converges."""
+"""IAPB against complementarity: where their motions agree, and when every impulse pushes."""
 
 from __future__ import annotations
 
@@ -105,32 +105,3 @@ def where_to_stop(numbers: Table) -> Drawn:
     return Drawn(panels, numbers, looks, {
         "limit": limit, "wrong": f"{wrong:.0f}", "pushed": max(row["pushing from the LCP"] for row in rows),
         "least": f"{min(prices):.2g}", "most": f"{max(prices):.2g}"})  # fmt: skip
-
-
-_ROUNDING = 1e-12  # smaller errors count as none
-_SCENES = 6  # shown, those with the largest errors
-_ERRORS = {"positions, sup norm": "error of positions", "velocities, L¹ over time": "error of velocities"}
-
-
-@recipe("rigid-convergence", "complementarity/convergence")
-def rigid_convergence(numbers: Table) -> Drawn:
-    """Draw a panel for the errors of positions and one for those of velocities."""
-    errors = {row["scene"]: max(row[column] for column in _ERRORS.values()) for row in numbers.records()}
-    shown = sorted(errors, key=errors.__getitem__)[-_SCENES:]
-    looks = looks_of(scene for scene, error in errors.items() if scene in shown and error > _ROUNDING)
-    panels = []
-    for label, column in _ERRORS.items():
-        with Plot(f"rigid-convergence-{column.split()[-1]}", (4.4, 3.4)) as plot:
-            drawn: list[tuple[float, float]] = []
-            for scene, look in looks.items():
-                rows = numbers.where(scene=scene).select(("step", column)).rows
-                curve = sorted((step, error) for step, error in rows if error > _ROUNDING)
-                plot.curve(curve, look)
-                drawn += curve
-            if drawn:  # a line of slope one below all curves
-                lowest, steps = min(error / step for step, error in drawn), [step for step, _ in drawn]
-                plot.curve([(step, 0.5 * lowest * step) for step in (min(steps), max(steps))], BOUND, marked=False)
-            plot.log("step [ms]", "error")
-            plot.ticks("x", sorted(set(numbers.column("step"))), "{:.2g}")
-        panels.append(Panel(plot.svg, f"Errors of {label} against the step.", label))
-    return Drawn(panels, numbers, looks | {"first order": BOUND})

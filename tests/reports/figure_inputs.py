@@ -45,8 +45,6 @@ def tables() -> dict[str, Table]:
             "pushing from the LCP; time of (21) [µs]; time of pushing [µs]", (
                 (rows, c, 1.0 * (c < 6), 6, 0.0 if c < 6 else 0.1 * c**0.3, 1e-16, 40.0 + c, 300.0 + c * c)
                 for rows in ("approaching", "touching") for c in (5, 12, 40, 150))),
-        "complementarity/convergence": ("scene; step [ms]; error of positions; error of velocities", (
-            (scene, h, 1e-4 * k * h, 2e-4 * k * h) for k, scene in enumerate(_SCENES) for h in (2.0, 1.0, 0.5))),
         "effect_costs": ("scene; effect; time saved [%]; error [mm]; best of its error", (
             ("peg_corner", effect, 60.0 / (k + 1), 10.0 ** (2 - k) if k < 4 else 0.0, "yes" if k % 2 else "no")
             for k, effect in enumerate(("hand_force", "wall_contacts", "coherence", "clustering", "friction")))),
