@@ -65,7 +65,6 @@ INTEGRATORS = {
     "semi_implicit_euler": STYLES["semi-implicit Euler"],
     "midpoint": STYLES["midpoint"],
     "runge_kutta_4": STYLES["Runge-Kutta 4"],
-    "commutator_free_4": STYLES["commutator-free Runge-Kutta 4"],
 }
 
 

@@ -79,7 +79,6 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("semi-implicit Euler",), LineStyle(MUTED, "s")),
     (("midpoint",), LineStyle(AMBER, "^", (5, 1.6))),
     (("Runge-Kutta 4",), LineStyle(GREEN, "D", (1.4, 1.4), filled=False)),
-    (("commutator-free Runge-Kutta 4",), LineStyle(PURPLE, "P", (6, 1.6, 1.4, 1.6))),
     # rows of an impact
     (("relative rows (12)",), LineStyle(BLUE, "D")),
     (("per-body rows (13)-(14)",), LineStyle(VERMILION, "X", (5, 1.6))),
