@@ -40,9 +40,6 @@ FIGURE_RUNS: dict[str, tuple[str, dict[str, Any], str, str]] = {
        for world in ("ideal", "IAPB", "PB")},
     "plane/two_link_arm": ("two_link_arm_a", {}, "IAPB", "full"),
     "plane/cradle": ("newton_cradle", {}, "IAPB", "full"),
-    "space/peg_hole": ("peg_hole_space", {}, "IAPB", "full"),
-    "space/arm_obstacles": ("arm_obstacles", {}, "IAPB", "full"),
-    "space/tumbling_body": ("tumbling_body", {}, "IAPB", "full"),
 }
 
 TILTED = "peg at every tilt"  # name of the input made by `tilted_runs`

@@ -20,7 +20,7 @@ from iapb.scene.model import scene_kind
 
 Floats = NDArray[np.float64]
 WORLD = "world"
-_CIRCLE_CORNERS, _BALL_CORNERS = 72, 48
+_CIRCLE_CORNERS = 72
 _THICKNESS = 0.1  # of planar shapes, as a share of the scene's size
 _REACH = 3.0  # of walls without end, as a multiple of the scene's size
 _RINGS = 12  # of a ball, from pole to pole
@@ -77,12 +77,12 @@ def outline(shape: Mapping[str, Any]) -> Floats:
     """Return the corners of a box, circle or polygon in the frame of its body."""
     frame = placement_of(shape)
     if shape["kind"] == "circle":
-        return frame.of(shape["radius"] * _circle(_CIRCLE_CORNERS))
+        return frame.of(shape["radius"] * _circle())
     return frame.of(0.5 * np.asarray(shape["size"]) * _SQUARE if shape["kind"] == "box" else shape["vertices"])
 
 
-def _circle(corners: int) -> Floats:
-    turn = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+def _circle() -> Floats:
+    turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
     return np.column_stack([np.cos(turn), np.sin(turn)])
 
 
@@ -138,11 +138,6 @@ class Solid:
     body: str
     vertices: Floats
     rings: Sequence[Sequence[int]]
-
-    @property
-    def sides(self) -> list[Floats]:
-        """The corners (n, 3) of each ring."""
-        return [self.vertices[list(ring)] for ring in self.rings]
 
     @property
     def faces(self) -> NDArray[np.int64]:
@@ -214,57 +209,3 @@ def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
     every = np.vstack([place.origin for name, place in places.items() if name]
                       + [places[solid.body].of(solid.vertices) for solid in bounded])  # fmt: skip
     return every.min(axis=0), every.max(axis=0)
-
-
-# The view of pictures in space
-
-
-def cuboid_of_inertia(body: Mapping[str, Any]) -> Floats:
-    """Return the sides (3,) [m] of the homogeneous box with the body's mass and principal moments of inertia.
-
-    The sides a, b, c follow from m (b² + c²) / 12 = I_xx and so on.
-    """
-    xx, yy, zz = body["inertia"][:3]
-    squares = 6.0 * (np.array([yy + zz - xx, zz + xx - yy, xx + yy - zz])) / body["mass"]
-    sides: Floats = np.sqrt(np.maximum(squares, 0.0))
-    return sides
-
-
-@dataclass(frozen=True)
-class View:
-    """A viewing direction: the rows of `axes` (3, 3) point to the right, up and at the reader."""
-
-    axes: Floats
-
-    def flat(self, points: Any) -> Floats:
-        """Return the projection (..., 2) [m] of points (..., 3) to the picture."""
-        return np.asarray(points, dtype=float) @ self.axes[:2].T
-
-    def depth(self, points: Any) -> float:
-        """Return how near [m] the mean of some points (..., 3) is to the reader."""
-        return float(np.mean(np.asarray(points, dtype=float) @ self.axes[2]))
-
-    def faces_reader(self, ring: Floats) -> bool:
-        """Return whether a ring of corners is seen from outside."""
-        return float(np.cross(ring[1] - ring[0], ring[2] - ring[1]) @ self.axes[2]) > 0.0
-
-    def disc(self, center: Floats, radius: float) -> Floats:
-        """Return the outline (n, 3) of a ball: a circle perpendicular to the line of sight."""
-        return center + radius * _circle(_BALL_CORNERS) @ self.axes[:2]
-
-
-def view(azimuth: float, elevation: float) -> View:
-    """Return the view from `azimuth` [rad] about z, counter-clockwise from x, and from `elevation` above the floor."""
-    (ca, ce), (sa, se) = np.cos((azimuth, elevation)), np.sin((azimuth, elevation))
-    return View(np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]))
-
-
-def links(scene: Mapping[str, Any], pose: Floats | None = None) -> Sequence[tuple[Floats, Floats]]:
-    """Return lines (from, to) [m] from joint to joint, and to the shapes: the skeleton of each mechanism."""
-    places, lines = body_placements(scene, pose), []
-    for body in scene["bodies"]:
-        if body["parent"] != WORLD:
-            own = places[body["name"]]
-            lines.append((places[body["parent"]].origin, own.origin))
-            lines += [(own.origin, own.of(shape["center"])) for shape in body["shapes"]]
-    return [(start, end) for start, end in lines if np.any(start != end)]

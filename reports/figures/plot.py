@@ -165,11 +165,10 @@ class Canvas(Plot):
         for corners in body_outlines(scene, pose):
             self.axes.fill(*corners.T, facecolor=color, edgecolor=edge, linewidth=width, zorder=2)
 
-    def hand(self, scene: Mapping[str, Any], pose: Floats | None, length: float,
-             flat: Callable[[Any], Floats] = lambda point: np.asarray(point, dtype=float)[:2]) -> None:  # fmt: skip
+    def hand(self, scene: Mapping[str, Any], pose: Floats | None, length: float) -> None:
         """Draw the hand's force as an arrow of the given length [m] from the point that it holds; call it last."""
-        if scene["hand"] and np.any(force := flat(scene["hand"]["force"][:3])):
-            start = flat(body_placements(scene, pose)[scene["hand"]["body"]].of(scene["hand"]["point"]))
+        if scene["hand"] and np.any(force := np.asarray(scene["hand"]["force"][:2], dtype=float)):
+            start = body_placements(scene, pose)[scene["hand"]["body"]].of(scene["hand"]["point"])[:2]
             self.named_arrow(start, length * force / np.hypot(*force), "hand")
 
     def named_arrow(self, start: Floats, vector: Floats, name: str) -> None:

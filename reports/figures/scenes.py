@@ -1,31 +1,16 @@
-"""Overview of all scenes (the parts of the energy over time, the deepest overlap), and pictures of those in space."""
+"""Overview of all scenes: the parts of the energy over time, and the deepest overlap."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.geometry import (
-    Floats,
-    View,
-    body_placements,
-    bounds,
-    cuboid,
-    cuboid_of_inertia,
-    links,
-    placement,
-    placement_of,
-    plane_frame,
-    view,
-)
 from reports.figures.numbers import format_number
-from reports.figures.plot import Canvas, Plot
+from reports.figures.plot import Plot
 from reports.figures.style import (
     AMBER,
     BLUE,
@@ -33,13 +18,9 @@ from reports.figures.style import (
     INK,
     LINK,
     MUTED,
-    PANEL,
-    PEG,
     PURPLE,
-    RULE,
     SKY,
     VERMILION,
-    WALL,
     LineStyle,
 )
 from verification.table import Table
@@ -138,95 +119,3 @@ def _energy(axes: Any, strip: Strip) -> None:
     axes.plot(strip.time[strip.struck], np.full(strip.struck.sum(), -0.1 * top), "|", color=FORCE, markersize=4.5)
     axes.axhline(0.0, color=MUTED, linewidth=0.5)
     axes.set(xlim=(0.0, strip.time[-1]), ylim=(-0.2 * top, 1.08 * top))
-
-
-# Scenes in space
-
-_MARGIN = 0.06
-_MARK = 0.04  # radius of the marked corner, as a share of the box's longest side
-
-
-@dataclass(frozen=True)
-class Sight:
-    """The viewpoint of a scene, and the `moments` of its run that are drawn, as fractions of its duration."""
-
-    run: str
-    seen: View
-    moments: tuple[float, ...]
-    floor: float = 0.0  # half side [m] of the piece of a half-space that is drawn; 0 = none
-    walls_around: float = 0.0  # half side [m] to which boxes of the static world are cut; 0 = whole
-
-
-SIGHTS = (
-    Sight("space/peg_hole", view(-1.2, 0.2), (0.0, 0.07, 1.0), walls_around=0.075),
-    Sight("space/arm_obstacles", view(-0.75, 0.5), (0.0, 0.4, 1.0), floor=0.5),
-    Sight("space/tumbling_body", view(-1.0, 0.4), (0.0, 0.45, 1.0)),
-)
-
-
-Piece = tuple[float, Floats, dict[str, Any]]  # nearness to the reader, points (n, 3) [m] of a ring or line, and look
-_BODY = {"facecolor": PEG, "edgecolor": INK, "linewidth": 0.9, "alpha": 0.7}  # hides 70 % of what lies behind it
-_STATIC = _BODY | {"facecolor": WALL, "edgecolor": MUTED, "alpha": 0.35}
-
-
-@recipe("scenes-space", *(sight.run for sight in SIGHTS))
-def scenes_space(*runs: Run) -> Drawn:
-    """Draw every scene at the moments of its `Sight`, to one scale."""
-    panels = []
-    for sight, run in zip(SIGHTS, runs, strict=True):
-        scene, flat = run.scene_resolved, sight.seen.flat
-        steps = [round(share * run.steps) for share in sight.moments]
-        drawn = [sorted(_pieces(sight, scene, run.pose[step]), key=lambda piece: piece[0]) for step in steps]
-        low, high = bounds([flat(points) for each in drawn for _, points, _ in each], _MARGIN)
-        for step, each in zip(steps, drawn, strict=True):
-            with Canvas(f"scenes-space-{run.scene_name}-{step}", low, high, PANEL) as canvas:
-                for order, (_, points, look) in enumerate(each):  # what is nearer is drawn later
-                    place, look = flat(points).T, look | {"zorder": 2 + 1e-3 * order}
-                    if len(points) == 2:
-                        canvas.axes.plot(*place, **look)
-                    else:
-                        canvas.axes.fill(*place, **look | {"edgecolor": "none"})
-                        canvas.axes.fill(*place, **look | {"facecolor": "none", "alpha": None}, joinstyle="round")
-                canvas.hand(scene, run.pose[step], 0.16 * float(max(high - low)), flat)
-            moment = f"{run.time[step]:.2f} s"
-            panels.append(Panel(canvas.svg, f"{scene['title']}, from aside, after {moment}.",
-                                f"{run.scene_name}, {moment}"))
-    return Drawn(panels)
-
-
-def _pieces(sight: Sight, scene: Mapping[str, Any], pose: Floats) -> Iterator[Piece]:
-    """Yield the faces, discs and lines of a scene at a pose that face the reader."""
-    seen, places = sight.seen, body_placements(scene, pose)
-    shapes = [(places[body["name"]] @ placement_of(shape), shape, _BODY)
-              for body in scene["bodies"] for shape in body["shapes"]]  # fmt: skip
-    for wall in scene["walls"]:
-        if wall["kind"] != "half_space":
-            wall = _cut(wall, sight.walls_around)
-            shapes.append((placement_of(wall), wall, _STATIC))
-        elif sight.floor:  # a square, moved to the reach of an arm, x > 0
-            square = sight.floor * (np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]]))
-            yield -np.inf, plane_frame(wall).of(square) + [0.7 * sight.floor, 0.0, 0.0], {
-                "facecolor": RULE, "edgecolor": MUTED, "linewidth": 0.6, "alpha": 1.0}
-    for line in links(scene, pose):
-        yield seen.depth(line), np.array(line), {"color": LINK, "linewidth": 4.0}
-    for body in scene["bodies"]:
-        if not body["shapes"] and body["joint"] == "free_flyer":
-            size, own = cuboid_of_inertia(body), places[body["name"]] @ placement(body["center_of_mass"])
-            shapes.append((own, {"kind": "box", "size": size}, _BODY))
-            yield np.inf, seen.disc(own.of(size / 2.0), _MARK * max(size)), {
-                "facecolor": FORCE, "edgecolor": FORCE, "linewidth": 0.5, "alpha": 1.0}
-    for own, shape, look in shapes:
-        rings = [seen.disc(own.origin, shape["radius"])] if shape["kind"] == "sphere" else [
-            ring for ring in cuboid("", own, shape["size"]).sides if seen.faces_reader(ring)]  # fmt: skip
-        for ring in rings:
-            yield seen.depth(own.origin), ring, look
-
-
-def _cut(wall: Mapping[str, Any], reach: float) -> Mapping[str, Any]:
-    """Return a static box, cut to a square with half side `reach` about the origin."""
-    if not reach or wall["kind"] != "box":
-        return wall
-    half, center = np.asarray(wall["size"]) / 2.0, np.asarray(wall["center"], dtype=float)
-    low, high = center - half, center + half
-    low[:2], high[:2] = np.maximum(low[:2], -reach), np.minimum(high[:2], reach)
-    return {**wall, "size": high - low, "center": (low + high) / 2.0}

@@ -1,8 +1,7 @@
-"""The topic of the scenes and its figures: sentences from records, strips, outlines in space as the engine has them."""
+"""The topic of the scenes and its figure: sentences from records, strips."""
 
 from __future__ import annotations
 
-import math
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
@@ -12,9 +11,7 @@ import pytest
 from iapb import find_scene, load_scene
 from iapb.run import Run
 from iapb.simulation import simulate
-from reports.evidence.runs import FIGURE_RUNS
 from reports.figures import scenes
-from reports.figures.geometry import cuboid, cuboid_of_inertia, placement, view
 from verification.finding import MIXED, REFUTED, REPRODUCED, Finding, finding_of
 from verification.scenes import ledger
 from verification.scenes.books import residual_row
@@ -71,25 +68,8 @@ def test_strips_show_every_joule(topic: Finding) -> None:
         assert not strip.at_rest
 
 
-def test_figures_are_drawn_and_can_stand_in_a_page(topic: Finding, runs: tuple[Run, ...]) -> None:
+def test_the_figure_is_drawn_and_can_stand_in_a_page(topic: Finding) -> None:
     inputs = {f"scene-ledger/{name}": table for name, table in topic.tables.items()}
-    inputs |= {name: runs[NAMES.index(FIGURE_RUNS[name][0])] for name in scenes.scenes_space.needs}
-    for recipe in (scenes.scenes_ledger, scenes.scenes_space):
-        figure = recipe.draw(inputs)
-        for panel in figure.panels:
-            ElementTree.fromstring(panel.svg)
-            assert panel.alt and not re.search("nan", panel.svg)
-
-
-def test_half_of_a_box_is_seen() -> None:
-    box = cuboid("", placement((1, 2, 3), (0.3, -0.2, 0.9)), (1, 2, 3))
-    assert len(box.sides) == 6 and sum(view(0.7, 0.4).faces_reader(ring) for ring in box.sides) == 3
-
-
-def test_the_box_of_an_inertia_has_that_inertia() -> None:
-    body = {"mass": 0.3, "inertia": [1e-3, 2e-3, 2.8e-3]}
-    a, b, c = cuboid_of_inertia(body)
-    assert [0.3 / 12 * (b * b + c * c), 0.3 / 12 * (c * c + a * a), 0.3 / 12 * (a * a + b * b)] == pytest.approx(
-        body["inertia"]
-    )
-    assert math.isfinite(a * b * c)
+    for panel in scenes.scenes_ledger.draw(inputs).panels:
+        ElementTree.fromstring(panel.svg)
+        assert panel.alt and not re.search("nan", panel.svg)
