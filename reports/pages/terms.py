@@ -59,8 +59,8 @@ TERMS: dict[str, tuple[str, str]] = {
     r"passiv\w+": ("passive", "gives no energy to whoever holds it: the stored energy never exceeds what was put in"),
     r"factored": ("factored", "the engine's method for one impact: it factors M and projects the velocity with an "
                   "orthonormal basis of the rows"),
-    r"no clamp": ("clamp", "the last operation of an impact, which scales the velocity so that rounding cannot add "
-                  "energy"),
+    r"no clamp": ("clamp", "the last operation of an impact, which corrects the velocity by a few units in the last "
+                  "place so that rounding cannot add energy"),
     r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, evaluated with "
                                                    "numpy as it is printed"),
     r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "
