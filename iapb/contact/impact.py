@@ -111,7 +111,7 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     budget : largest number of rows used, the most violated first (``factored`` only). Every budget is passive.
     clamp : whether to scale Δv so that rounding cannot raise the energy, in real arithmetic. Default: True.
     rank_tolerance : a row closer than this to the span of the rows used (unit rows, kinetic metric) is not used.
-        Default: 1e-10, or 8 d ε κ(L), the rounding of the rows, where this is larger.
+        Default: 1e-10, or 4 d ε κ(L), the rounding of the rows, where this is larger.
 
     Returns
     -------
