@@ -24,7 +24,6 @@ from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.rendering import PLANNED, Port
-from iapb.haptics.waveforms import waveform_weights
 from iapb.linalg import cholesky
 from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.arrays import make_workspace
@@ -205,9 +204,8 @@ class System:
         on -= {"delay", "quantisation"} if external else set()
         device = self.mechanism if hand is None else self.device_mechanism()
         (v_start, v_stop), (q_start, q_stop) = self.tool_dofs, self.tool_coordinates
-        weights = waveform_weights(settings.waveform if settings and "waveform" in on else "step", self.dt)
         lengths = {"velocity": d, "tool": v_stop - v_start, "tool_coordinate": q_stop - q_start,
-                   "tool_body": len(device.bodies), "weight": len(weights),
+                   "tool_body": len(device.bodies),
                    "slot": 1 + (settings.delay if settings and "delay" in on else 0),
                    "planned": PLANNED if hand is not None and hand.changes else 0}
         port = Port(
@@ -219,7 +217,7 @@ class System:
             mechanism=device.block, body=make_workspace(len(device.bodies), device.nv),
             varying_inertia=not device.has_constant_mass_matrix, damped="device_damping" in on,
             free=make_free_motion(device.arrays, device.tree_of_body), limited="device_limits" in on,
-            quantised="quantisation" in on, pulsed=len(weights) > 1,
+            quantised="quantisation" in on,
         )
         for name, values in coupling.settings.items():
             if len(values) != lengths["tool"]:  # else the kernels would read past the end
@@ -228,7 +226,7 @@ class System:
             getattr(port, name)[:] = values
         port.device_q[:] = port.sensed_q[:] = port.measured_q[:] = self.start[0][q_start:q_stop]
         port.device_v[:] = self.start[1][v_start:v_stop]
-        port.pulse_weights[:], port.force_limit[:] = weights, np.inf
+        port.force_limit[:] = np.inf
         if settings is not None:
             for array, values in ((port.force_limit, settings.force_limit),
                                   (port.device_damping, settings.damping if port.damped else None),

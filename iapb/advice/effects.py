@@ -64,7 +64,6 @@ class Question:
     uses: frozenset[str]  # parts of the contact section that the law uses
     coupling: str | None
     own_gains: Any  # of a coupling object of the caller; None: the scene's gains
-    logs_impulses: bool  # the law logs the energy lost in impulses, which the observer of pulses needs
     rendering: str | None
 
     @cached_property
@@ -215,15 +214,6 @@ def _device(field: str, unit: str, left_out: str) -> Rule:
                 absent=Question.no_device)
 
 
-def _one_step(q: Question) -> str:
-    """Return why an impulse reaches the hand within one step; empty if it is spread over many."""
-    if q.coupling == "unilateral":
-        return "a unilateral coupler gives the hand no impulse"
-    if not q.logs_impulses:
-        return f"the law '{q.law}' does not say what its impulses take"
-    return "device.waveform = step: an impulse is given in one step" if q.device.waveform == "step" else ""
-
-
 EFFECTS: dict[str, Rule] = {
     # (1): gravity G, mass matrix M(q), Coriolis and centripetal forces B, force of the hand J_h^T F_h
     "gravity": Rule(lambda q: f"gravity is on: gravity = {numbers(q.scene.gravity)} m/s2",
@@ -306,10 +296,6 @@ EFFECTS: dict[str, Rule] = {
                             "the coupling would be fed exact positions and velocities"),
     "device_damping": _device("damping", "N s/m, N m s/rad",  # it bounds the virtual damping (C20)
                               "the device would be a pure inertia, the worst case for stability"),
-    "waveform": Rule(
-        lambda q: f"device.waveform = {q.device.waveform}: an impulse is given over many steps, watched by the "
-        "observer", "the hand would get each impulse as a blow of one step", _one_step, (laws.IMPULSES,),
-        lambda q: q.no_device() or q.no_contact()),
 }
 
 EFFECT_NAMES = tuple(EFFECTS)
@@ -363,7 +349,7 @@ def decide_for(
     uses = laws.EVERYTHING | {laws.JOINTS} if known is None else getattr(known, "uses", laws.EVERYTHING)
     names = (one if one is None or isinstance(one, str) else one.name for one in (law, coupling))
     q = Question(scene, facts, next(names), uses, next(names), coupling if hasattr(coupling, "stiffness") else None,
-                 law is None or isinstance(law, str) or getattr(law, "impulses", False), rendering)
+                 rendering)
     return tuple(rule.decide(name, q) for name, rule in EFFECTS.items())
 
 

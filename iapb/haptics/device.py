@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from iapb.compiled import Entry
 from iapb.errors import ArgumentError, IapbError
-from iapb.haptics.rendering import NO_COUPLING, UNILATERAL, engage, observe_work
+from iapb.haptics.rendering import NO_COUPLING, UNILATERAL, engage
 from iapb.linalg import cholesky, solve_mass
 from iapb.mechanics.bodies import finite_array
 from iapb.schema import Floats
@@ -122,7 +122,7 @@ class DeviceLink:
         if not callable(getattr(device, "read", None)) or not callable(getattr(device, "apply", None)):
             raise ArgumentError("device", device, "an object with read() and apply(force), see iapb.haptics.device")
         self.device, self._world, self._state, self._port = device, world, state, port
-        self._engage, self._observe = Entry(engage), Entry(observe_work)
+        self._engage = Entry(engage)
         self._read()
 
     def send(self) -> None:
@@ -134,11 +134,7 @@ class DeviceLink:
     def receive(self) -> None:
         """Read the device at the end of the step, then update the port as `move_device` does."""
         world, state, port = self._world, self._state, self._port
-        before = port.device_v.copy()
         self._read()
-        if port.pulsed:
-            port.acceleration[:] = (port.device_v - before) / world.dt
-            self._observe(world, port)
         port.clock[0] += 1
         if port.coupling == UNILATERAL:
             self._engage(world, state, port)

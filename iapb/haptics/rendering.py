@@ -53,12 +53,6 @@ class Port(NamedTuple):
     limited: bool  # the actuators clip the commanded force to force_limit
     resolution: Annotated[Floats, "tool"]  # [m, rad] of the position sensors, in the tangent where q is no vector
     quantised: bool
-    pulsed: bool  # an impulse is rendered over more than one step
-    pulse_weights: Annotated[Floats, "weight"]  # shares of an impulse in the w steps after it, sum 1
-    pulse_pending: Annotated[Floats, "weight tool"]  # ring of forces still to be rendered [N, N m]
-    pulse_force: Annotated[Floats, "tool"]  # force of the pulses in this step
-    pulse_balance: Annotated[Floats, "1"]  # [J] loss in the tool's collisions minus the work of the pulses
-    pulse_held: Annotated[Integers, "1"]  # steps in which the observer held a pulse back
     delayed_force: Annotated[Floats, "slot tool"]  # ring of actuator forces on their way; one slot: no delay
     delayed_q: Annotated[Floats, "slot tool_coordinate"]  # ring of measured positions on their way
     delayed_v: Annotated[Floats, "slot tool"]
@@ -179,48 +173,6 @@ def coordinate(state, port):
         port.coupling_force[k] = port.stiffness[i] * port.error[i] + port.damping[i] * rate
 
 
-# Rendering of an impulse over several steps, and the passivity observer that prevents an energy gain.
-
-
-@kernel(needs="device")
-def shape_impulse(world, state, port):
-    """Spread the step's impulse by the waveform's weights; render the share due now in place of the whole impulse.
-
-    Passivity observer: the pulses may give the device no more energy than the tool's collisions took. If the share of
-    this step would give more, it is added to the share of the next step, so that no momentum is lost.
-    """
-    slots = port.pulse_weights.shape[0]
-    now = port.clock[0] % slots
-    power = 0.0  # [W] of the force due now, on the moving device
-    for i in range(port.pulse_force.shape[0]):
-        force = state.impulse[port.v_start + i] / world.dt
-        if force != 0.0:
-            for j in range(slots):
-                port.pulse_pending[(now + j) % slots, i] += port.pulse_weights[j] * force
-        power += port.pulse_pending[now, i] * port.device_v[i]
-    for line in range(state.impacts.logged[0]):
-        if state.impacts.group[line] == state.island_of_tree[port.tool_tree]:
-            port.pulse_balance[0] += state.impacts.energy_lost[line]
-    hold = power > 0.0 and port.pulse_balance[0] < world.dt * power
-    port.pulse_held[0] += hold
-    for i in range(port.pulse_force.shape[0]):
-        due = port.pulse_pending[now, i]
-        port.pulse_pending[now, i] = 0.0
-        if hold:
-            port.pulse_pending[(now + 1) % slots, i] += due
-            due = 0.0
-        port.pulse_force[i] = due
-        port.environment_force[port.v_start + i] += due - state.impulse[port.v_start + i] / world.dt
-
-
-@kernel
-def observe_work(world, port):
-    """Subtract the work of this step's pulse from the energy balance: force times the mean velocity of the step."""
-    for i in range(port.pulse_force.shape[0]):
-        mean = port.device_v[i] - 0.5 * world.dt * port.acceleration[i]
-        port.pulse_balance[0] -= world.dt * port.pulse_force[i] * mean
-
-
 # Rendering and device: F_env (26), the actuator force that renders it, and the device's motion (paper V-C, VI).
 
 
@@ -239,8 +191,6 @@ def render(world, state, port):
         port.environment_force[k] = contact + state.impulse[k] / world.dt
     if port.coupling == NO_COUPLING:
         return
-    if port.pulsed:
-        shape_impulse(world, state, port)
     command(port)
 
 
@@ -281,8 +231,6 @@ def move_device(world, state, port):
     for i in range(a.shape[0]):
         port.device_v[i] += world.dt * a[i]
         finite = finite and abs(port.device_v[i]) < LARGEST_SPEED
-    if port.pulsed:
-        observe_work(world, port)
     if world.conserving and port.free.kind[0] == RIGID:
         move_simple_trees(port.mechanism, port.free, port.trees, port.device_q, port.device_v, world.dt)
     else:

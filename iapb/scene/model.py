@@ -192,9 +192,6 @@ class SpatialHand(Hand):
         (0.0,) * 6, description="constant force and torque [N, N, N, N m, N m, N m], world axes; default: none")
 
 
-Waveform = Literal["step", "brake"]
-
-
 class Device(ScenePart):
     """The haptic device. It has the tool's kinematics, so its lists have one number per tool coordinate."""
 
@@ -206,8 +203,6 @@ class Device(ScenePart):
         "coordinate [m, rad]; default: exact")
     damping: PerCoordinate | None = Field(None, description="physical damping per coordinate [N s/m, N m s/rad]; "
         "default: none")
-    waveform: Waveform = Field("step", description="how an impulse reaches the hand: in one step, or as a "
-        "brake; default step")
 
 
 class Gains(ScenePart):

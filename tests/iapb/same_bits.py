@@ -16,7 +16,6 @@ import numpy as np
 from iapb.contact.impact import resolve_frictional_impact, resolve_impact
 from iapb.haptics.coupling import FourChannel
 from iapb.haptics.device import SimulatedDevice
-from iapb.haptics.waveforms import WAVEFORMS, waveform_weights
 from iapb.scene import load_scene
 from iapb.simulation import simulate
 
@@ -32,7 +31,6 @@ def hashes() -> dict[str, str]:
         scene = load_scene(path).with_values({"contact.forces": "implicit"})
         found[f"implicit {path.stem}"] = _run_hash(scene)
     found["coupled peg"] = _run_hash(load_scene(SCENES / "peg_corner.yaml"), coupling=GAINS)
-    found["waveforms"] = _hash([waveform_weights(name, 1e-3) for name in WAVEFORMS])
     found["device"] = _device_hash()
     answers = [resolve_impact(M, J, v, 0.5) for M, J, v in _impacts()]
     found["factored"] = _hash([(answer.velocity, answer.impulses) for answer in answers])

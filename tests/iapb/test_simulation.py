@@ -178,7 +178,7 @@ CHANGES = [  # what scenes with equal bodies or walls might share
     {}, {"contact.friction": 0.2, "contact.friction_law": "coulomb"}, {"contact.restitution": 0.5},
     {"walls.floor.restitution": 0.6}, {"bodies.peg.mass": 1.5}, {"bodies.peg.position": [0.021, -0.0135, 0.02]},
     {"bodies.peg.joint_damping": [1.0, 1.0, 0.0]}, {"rate": 700.0}, {"hand.point": [0.005, 0.002]},
-    {"hand.force_function": ["0.1*sin(9*t)", "0", "0"]}, {"device.delay": 3}, {"device.waveform": "brake"},
+    {"hand.force_function": ["0.1*sin(9*t)", "0", "0"]}, {"device.delay": 3},
 ]
 
 

@@ -69,7 +69,7 @@ def drawn(rng: np.random.Generator) -> tuple[Scene, Any, str]:
     gains = {"stiffness": [50.0] * d, "damping": [1.0] * d}
     values["couplings"] = {"four_channel": gains, "unilateral": gains}
     values["device"] = {"position_resolution": [1e-3] * d, "delay": int(rng.integers(0, 3)), "force_limit": [2.0] * d,
-                        "damping": [0.1] * d, "waveform": str(rng.choice(["step", "brake"]))}
+                        "damping": [0.1] * d}
     scene = scene_kind(values).model_validate(values)
     law = ImpulseAugmented(rendering=str(rng.choice(RENDERINGS))) if rng.random() < 0.7 else Penalty()
     return scene, law, str(rng.choice(["none", "four-channel", "unilateral"]))

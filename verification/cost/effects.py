@@ -69,7 +69,6 @@ LEFT_OUT: dict[str, Variant] = {
         ("quantisation", "device.position_resolution", None),
         ("device_damping", "device.damping", None),
         ("device_limits", "device.force_limit", None),
-        ("waveform", "device.waveform", "step"),
     )},
 }  # fmt: skip
 # Effects that a switch of the step can turn on in a scene that does not need them; they then change nothing. Friction

@@ -1,4 +1,4 @@
-"""The peg of Figure 4 in the loop of the device: when it comes to rest, how often it bounces, what the hand feels."""
+"""The peg of Figure 4 in the loop of the device: when it comes to rest, and how often it bounces."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from iapb.haptics.waveforms import WAVEFORMS
-from iapb.run import Run
 from verification.check import Check, Study
 from verification.finding import Part, verdict_of_trials
 from verification.scenes.measures import bounces, deepest_penetration, settling_time, trace_of
@@ -24,7 +22,6 @@ DEVICES: dict[str, tuple[float, dict[str, Any]]] = {
     "512 Hz": (512.0, {}), "512 Hz, late sensors": (512.0, LATE),
     "1 kHz": (1000.0, {}), "1 kHz, late sensors": (1000.0, LATE),
 }
-WAVEFORM_RATE = 1000.0  # [Hz]
 
 
 def _contacts(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str, Any]]:
@@ -60,38 +57,8 @@ def peg(pegs: Table) -> Part:
         verdict_of_trials(sooner))
 
 
-def _pulse(study: Study, name: str) -> dict[str, Any]:
-    """Return what the hand feels. Rate-hardness is the first rise of the force in one step over the approach speed."""
-    scene = study.scene(SCENE).with_values({"rate": WAVEFORM_RATE, "device.waveform": name})
-    run: Run = study.run(scene, "IAPB", keep=False)
-    trace = trace_of(run)
-    pulse = run.environment_force - run.penalty_force - run.friction_force
-    mean = 0.5 * (run.device_v[1:] + run.device_v[:-1])
-    computed = run.impulse.sum(axis=0)
-    first = int(run.impacts.step[0])
-    size = float(np.linalg.norm(pulse[first, :2]))
-    speed = abs(float(run.device_v[first, :2] @ pulse[first, :2])) / size
-    return {
-        "waveform": name, "rate-hardness [N/m]": size / run.dt / speed,
-        "peak force [N]": float(np.abs(run.device_force[:, :2]).max()), "settles after [s]": settling_time(trace),
-        "bounces": bounces(trace), "penetration [mm]": 1e3 * deepest_penetration(trace),
-        "momentum not given": float(np.abs(pulse.sum(axis=0) * run.dt - computed).max() / np.abs(computed).max()),
-        "given to the hand [mJ]": 1e3 * float(np.sum(pulse * mean) * run.dt),
-        "lost in collisions [mJ]": 1e3 * float(run.impacts.energy_lost.sum()),
-    }
-
-
 PEG = Check(
     key="peg", question="Does the peg come to rest no later with impulses than with penalties?",
     cases=lambda study: product(DEVICES, STIFFNESSES[study.depth], DAMPINGS[study.depth]), row=_contacts, says=peg,
     digits=3, note="A dash: the peg never came to rest.",
-)
-PULSES = Check(
-    key="waveforms", question="Every waveform of the device gives the hand the computed momentum, and no more energy "
-    "than the collisions took.", cases=lambda study: WAVEFORMS, row=_pulse, digits=3,
-    holds=lambda row: bool(row["given to the hand"] <= row["lost in collisions"]),
-    spans=("momentum not given", "peak force"),
-    note="The peg in the corner at 1 kHz; its device renders the impulses with each waveform. Negative energy: the "
-    "pulses took energy from the hand. Momentum not given: the part of the computed impulse that the device has not "
-    "rendered when the run ends.",
 )

@@ -53,7 +53,6 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
     "delay": (PEG, {"device.delay": 4}, {"device.delay": 0}, "4 steps, 7.8125 ms"),
     "quantisation": (PEG, {"device.position_resolution": [1e-5, 1e-5, 0]}, {}, "[1e-05, 1e-05, 0]"),
     "device_damping": (PEG, {"device.damping": [0.5, 0.5, 0]}, {"device.damping": [0, 0, 0]}, "[0.5, 0.5, 0]"),
-    "waveform": (PEG, {"device.waveform": "brake"}, {"device.waveform": "step"}, "device.waveform = brake"),
 }
 
 
@@ -95,7 +94,7 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
     ("impact_friction", ROUGH, ("impulse-augmented penalty",), False, "does not use it", ""),
     ("impact_friction", PER_BODY, (RUBBING,), False, "per_body", ""),
     *((name, PEG, (None, "none"), False, "no coupling", "")
-      for name in ("coupling", "device_limits", "delay", "quantisation", "device_damping", "waveform")),
+      for name in ("coupling", "device_limits", "delay", "quantisation", "device_damping")),
     ("coupling", PEG.with_values({"couplings.unilateral": None}), (None, "four-channel"), True, "four-channel", ""),
     ("coupling", PEG.with_values({"couplings.unilateral": None}), (None, "unilateral"), False,
      "couplings.unilateral", ""),

@@ -83,8 +83,6 @@ CASES = {
     "sensors of resolution 0": peg(device__position_resolution=[0, 0, 0]),
     "hand holds still": peg(hand__force=[0, 0, 0]),
     "unilateral": peg(law=IAPB, coupling="unilateral"),
-    "brake": peg(device__waveform="brake"),
-    "brake, no impulses": peg(law=PENALTY, device__waveform="brake"),
     "pendulum": ("double_pendulum", {}, IAPB, "none"),
     "one link": ("double_pendulum", ONE_LINK, IAPB, "none"),
     "damped": ("double_pendulum", {"bodies.upper.joint_damping": 0.1}, IAPB, "none"),
@@ -100,7 +98,7 @@ ONLY = {
     "impulses": "resolve_collisions find_islands resolve_island factored_impact",
     "unequal_restitution": "resolve_unequal poisson_impact pair_restitution",
     "impact_friction": "add_friction_to_impact add_impact_friction", "device_limits": "largest_share",
-    "coupling": "measure coordinate command", "quantisation": "sense", "waveform": "shape_impulse observe_work",
+    "coupling": "measure coordinate command", "quantisation": "sense",
     "hand_force": "press", "joint_damping": "damp_joints", "joint_limits": "add_stops",
     "varying_inertia": "mass_matrix cholesky_tree_blocks", "velocity_terms": "bias",
 }

@@ -166,8 +166,7 @@ def run_with(scene, coupling, device):
 
 # Unilateral, the compiled device carries the free tool without delay and sensors: that a real one cannot.
 CASES = [("four-channel", {}), ("unilateral", {}), ("four-channel", {"device.delay": 2}),
-         ("four-channel", {"device.position_resolution": [1e-5, 1e-5, 0]}),
-         ("four-channel", {"device.waveform": "brake"})]
+         ("four-channel", {"device.position_resolution": [1e-5, 1e-5, 0]})]
 
 
 @pytest.mark.parametrize(("coupling", "values"), CASES, ids=str)

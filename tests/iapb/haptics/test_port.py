@@ -9,7 +9,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
-from iapb.haptics.rendering import command, couple, observe_work, shape_impulse
+from iapb.haptics.rendering import command, couple
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.system import System
 
@@ -68,30 +68,3 @@ def test_unilateral_actuators_give_the_coupler_alone_and_others_all_of_it() -> N
         port.environment_force[:], port.coupling_force[:] = rng.normal(size=(2, len(port.coupling_force)))
         command(port)
         assert np.array_equal(port.device_force, share * port.environment_force[tool] - port.coupling_force[tool])
-
-
-def test_pulses_wait_where_they_would_give_more_than_collisions_took_and_lose_no_momentum() -> None:
-    """Of random collisions; what a step cannot see before it lets a pulse go is its change of speed."""
-    system, world, state, port = started(BEHIND.with_values({"device.waveform": "brake", "rate": 1000}))
-    rng, tool, dt = np.random.default_rng(0), slice(*system.tool_dofs), world.dt
-    took = work = slack = 0.0
-    given, computed = np.zeros((2, len(port.pulse_force)))
-    for step in range(300):
-        port.clock[0], state.impacts.logged[0], port.environment_force[:] = step, 2, 0.0
-        state.impulse[:] = rng.normal(size=len(state.impulse)) * (rng.random() < 0.4)
-        waiting = port.pulse_pending[step % len(port.pulse_pending)]  # the device moves along it: the worst case
-        port.device_v[:] = np.abs(rng.normal(size=len(waiting))) * np.sign(waiting + 1e-9)
-        port.acceleration[:] = rng.normal(size=len(waiting))
-        state.impacts.group[:2], state.impacts.energy_lost[:2] = rng.permutation(2), rng.exponential(0.05, 2)
-        state.island_of_tree[:] = (0, 1)
-        took += state.impacts.energy_lost[:2][state.impacts.group[:2] == 1].sum()
-        shape_impulse(world, state, port)
-        asked = port.pulse_force - state.impulse[tool] / dt
-        assert port.environment_force[tool] == pytest.approx(asked, abs=1e-9)
-        observe_work(world, port)
-        given, computed = given + dt * port.pulse_force, computed + state.impulse[tool]
-        work += dt * port.pulse_force @ (port.device_v - 0.5 * dt * port.acceleration)
-        slack = max(slack, 0.5 * dt**2 * np.abs(port.pulse_force) @ np.abs(port.acceleration))
-        assert work <= took + slack + 1e-12
-    assert given + dt * port.pulse_pending.sum(axis=0) == pytest.approx(computed, abs=1e-12)
-    assert 0 < port.pulse_held[0] < 300

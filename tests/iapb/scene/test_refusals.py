@@ -110,7 +110,6 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "device": [[], 3],
     "device.force_limit": [*NOT_A_PAIR_OF_GAINS, [0, 1]],
     "device.delay": [-1, 1001, 1.0, "1", None, True],
-    "device.waveform": ["bell", "", "Step", 0, None, True],
     **{path: values for values, paths in (
         (NOT_POSITIVE, "bodies.slide.mass bodies.puck.mass bodies.puck.inertia bodies.puck.shapes.0.radius "
                        "contact.friction_velocity"),
