@@ -503,7 +503,7 @@ def chosen_scene(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
     elif scene.chosen_fields:
         choice, said = _firm(scene)
         scene = scene.model_copy(update={"contact": scene.contact.choosing(choice)})
-    return _at_rest(scene, said) if scene.contact.resting_start else (scene, said)
+    return scene, said
 
 
 def _firm(scene: Scene) -> tuple[dict[str, float], tuple[str, ...]]:
@@ -552,57 +552,3 @@ def _chosen(start: Start) -> tuple[dict[str, float], tuple[str, ...]]:
     choice = {name: min(value, LARGEST_NUMBER) for name, value in choice.items()}
     return choice, said or (f"contact.auto chose {_listed(choice)}: effective mass {1.0 / mobility:.3g} kg at {who}, "
                             f"{scene.rate:g} Hz",)
-
-
-# What `contact.resting_start` chooses
-
-SETTLING = 8  # Newton steps: the rows turn with the bodies, and the displacements are small
-BALANCED = 1e-6  # largest unbalanced share of the load
-DIGITS = 10  # of positions in m and rad, so that rounding in linear algebra has no effect
-
-
-def _at_rest(scene: Scene, said: tuple[str, ...]) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with touching bodies moved to the equilibrium of springs and sticking friction, and remarks."""
-    scene = settling = scene.with_values({"contact.resting_start": False})
-    why = "no equilibrium was found"
-    for _ in range(SETTLING):
-        found = _sunk(Start(settling))
-        if not found:
-            moved = float(np.abs(mechanism.start_of(settling)[0] - mechanism.start_of(scene)[0]).max())
-            return settling, (*said, f"contact.resting_start moved what touches by up to {moved:.3g} m, rad")
-        if isinstance(found, str):
-            why = found
-            break
-        settling = settling.with_values(found)
-    return scene, (*said, f"contact.resting_start: left as given, for {why}")
-
-
-def _sunk(start: Start) -> dict[str, Any] | str:
-    """Do one Newton step to equilibrium: return new positions by path, none if it is reached, or why there is none."""
-    # Springs and friction λ balance the load f: K JᵀJ δ + Tᵀλ = f − K Jᵀg, with the least √K δ and λ/√K, so that
-    # nothing moves along its contacts. No contact may pull, and the friction forces must not exceed μ N in sum.
-    if not start.touching or start.scene.contact.stiffness == 0.0:
-        return "nothing touches, or no spring holds it"
-    rows, K, trees = np.concatenate(start.touching), start.scene.contact.stiffness, start.mechanism.tree_of_body
-    members = np.isin(trees, [start.tree_a[rows], start.tree_b[rows]])
-    ours = members[start.mechanism.arrays.dof_body]
-    if start.v[ours].any() or (start.found.shape_a[rows] == start.found.shape_b[rows]).any():
-        return "what touches moves, or is a joint at its limit"
-    J, g, f = start.rows[rows][:, ours], start.found.gap[rows], start.applied(start.q)[ours]
-    T = np.concatenate([start.rows[:0], *(start.slips(i) for i in rows if start.friction[i] > 0.0)])[:, ours]
-    scale = np.repeat([1.0 / math.sqrt(K), math.sqrt(K)], [J.shape[1], len(T)])
-    held = np.hstack([K * J.T @ J, T.T])
-    solved = scale * np.linalg.lstsq(held * scale, f - K * J.T @ g, rcond=1e-9)[0]
-    delta, friction = solved[: J.shape[1]], solved[J.shape[1] :]
-    push, size = -K * (g + J @ delta), float(np.abs(f).max(initial=0.0))
-    open_load = float(np.abs(f + J.T @ push - T.T @ friction).max(initial=0.0))
-    most = float((start.friction[rows] * np.maximum(push, 0.0)).sum())
-    if open_load > BALANCED * size or push.min() < -BALANCED * size or np.abs(friction).sum() > most + BALANCED * size:
-        return "what touches would slide, tip or fall"
-    if float(np.abs(delta).max()) <= 10.0**-DIGITS:
-        return {}
-    moved = np.zeros(start.mechanism.nv)
-    moved[ours] = delta
-    q, first = start.mechanism.integrate(start.q, moved, 1.0), start.mechanism.arrays.q_start
-    return {f"bodies.{body.name}.position": q[first[b] : first[b] + len(body.position)].round(DIGITS).tolist()
-            for b, body in enumerate(start.scene.bodies) if members[b]}

@@ -69,8 +69,6 @@ class Contact(ScenePart):
 
     auto: Truth = Field(False, description="true: stiffness, damping and coherence_distance are chosen from masses, "
         "sizes, gravity and rate where they are not given; contact: auto is short for it; default false")
-    resting_start: Truth = Field(False, description="true: what touches at the start begins where springs and "
-        "friction hold it; default false")
     forces: Literal["implicit", "paper"] = Field("implicit", description="implicit (default): resting forces that no "
         "stiffness or step makes unstable, friction in impacts, stiffness and damping chosen for a sag below 0.1 mm; "
         "paper: explicit (5), impacts without friction, K = 1000, B = 50; contact: paper is short for it")

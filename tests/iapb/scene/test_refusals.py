@@ -122,7 +122,7 @@ IN_THE_PLANE: dict[str, list[Any]] = {
         (NOT_A_PAIR_OF_GAINS, "device.position_resolution device.damping couplings.four_channel.stiffness "
                               "couplings.four_channel.damping couplings.unilateral.stiffness "
                               "couplings.unilateral.damping"),
-        ([1, "true", None], "contact.auto contact.resting_start contact.self_collisions"),
+        ([1, "true", None], "contact.auto contact.self_collisions"),
         ([3, None, "x" * 2001], "title source"),
         ([*NOT_A_VECTOR, [0.0, 0.0]], "bodies.slide.axis bodies.arm.center_of_mass walls.floor.normal"),
     ) for path in paths.split()},
