@@ -12,7 +12,7 @@ from verification.claims.speed import C19, C22
 from verification.cost.accuracy import BUDGET_ROWS
 from verification.cost.calls import PRINTED
 from verification.cost.effects import steps, summary
-from verification.cost.growth import FACTORED, FITTED, SCALING, fitted
+from verification.cost.growth import FACTORED, FITTED, MILLISECOND, SCALING, fitted
 from verification.cost.robots import MANY, ONE, ROBOTS
 from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL
 from verification.cost.steps import BODIES, IDEAL, RACES
@@ -66,7 +66,7 @@ def _kernels(*ratios: float) -> Table:
                           "upper quartile": ratio} for k, ratio in enumerate(ratios, 1)])  # fmt: skip
 
 
-LATE = C19.table_of([{"method": name, "coordinates": 3, "contacts": c, "late calls [of 1000]": 0}
+LATE = C19.table_of([{"method": name, "deadline": MILLISECOND, "coordinates": 3, "contacts": c, "late calls": 0}
                      for name, c in (("factored", 600), ("the printed formula", 60))])  # fmt: skip
 
 

@@ -22,9 +22,8 @@ from verification.table import Row, Table
 
 DAMPINGS = (10.0, 40.0, 60.0)  # B of (5) [N s/m]: with the smallest the ball bounces at edges, with the largest not
 SCENE = "faceted_socket"
-BALL_RADIUS, FACET_ANGLE = 0.02, math.radians(10.0)  # [m], [rad] of the scene
-# Distance [m] between the ball's two contacts at an edge, which is the jump of a contact from facet to facet.
-EDGE_JUMP = 2.0 * BALL_RADIUS * math.sin(0.5 * FACET_ANGLE)
+RADIUS, BALL_RADIUS, FACETS, STEEP = 0.2, 0.02, 9, math.radians(70.0)  # [m], facets in a right angle, start [rad]
+LARGEST_SPEED = 1.2445  # [m/s] of a ball that rolls down from there without loss
 COUNTED = ("false collisions", "contacts taken as new", "doubled contacts", "steps off the facets", "energy lost [J]",
            "energy lost, share of the fall")
 SETTINGS = {  # the filter distances that are switched off
@@ -33,22 +32,41 @@ SETTINGS = {  # the filter distances that are switched off
 }  # fmt: skip
 
 
-def socket(contact: Mapping[str, Any], rate: float | None = None) -> Scene:
-    """Return the scene with some contact values changed, and perhaps another rate [Hz]."""
+def edge_jump(facets: int = FACETS) -> float:
+    """Distance [m] between the ball's two contacts at an edge, which is the jump of a contact from facet to facet."""
+    return 2.0 * BALL_RADIUS * math.sin(0.25 * math.pi / facets)
+
+
+def socket(contact: Mapping[str, Any], rate: float | None = None, facets: int = FACETS) -> Scene:
+    """Return the scene with some contact values changed, and perhaps another rate [Hz] or number of facets."""
     values: dict[str, Any] = {f"contact.{name}": value for name, value in contact.items()}
-    return _shipped().with_values(values if rate is None else values | {"rate": rate})
+    return _faceted(facets).with_values(values if rate is None else values | {"rate": rate})
 
 
 @cache
-def _shipped() -> Scene:
-    return load_scene(find_scene(SCENE))
+def _faceted(facets: int) -> Scene:
+    """Return the shipped scene, or the same socket and start with another number of facets in a right angle."""
+    scene, angle = load_scene(find_scene(SCENE)), 0.5 * math.pi / facets
+    if facets == FACETS:
+        return scene
+
+    def point(radius: float, number: float) -> list[float]:
+        return [radius * math.sin(number * angle), -radius * math.cos(number * angle)]
+
+    walls = [{"name": f"facet_{number}", "kind": "polygon", "vertices": [
+        point(radius, end) for radius, end in ((RADIUS, number - 0.5), (1.1 * RADIUS, number - 0.5),
+                                               (1.1 * RADIUS, number + 0.5), (RADIUS, number + 0.5))]}
+             for number in range(-facets, facets + 1)]  # fmt: skip
+    touching = RADIUS * math.cos(0.5 * angle) - BALL_RADIUS + 1e-6  # by a micrometre
+    start = point(touching, -round(STEEP / angle))
+    return scene.with_values({"walls": walls, "bodies.ball.position": [*start, 0.0]})
 
 
 def count_false(run: Run) -> dict[str, Any]:
     """Count the false collisions of a run of the socket.
 
-    Besides the columns of the table: the largest speed of the ball's centre [m/s]; and for each false collision the
-    time [s], and the energy lost so far as a share of the fall, from the start to the lowest point.
+    Besides the columns of the table: "on return", those in the step after one without contact; and for each false
+    collision the time [s], and the energy lost so far as a share of the fall, from the start to the lowest point.
     """
     per_step = np.diff(run.contacts.offsets)
     first = int(np.flatnonzero(per_step)[0])
@@ -61,7 +79,7 @@ def count_false(run: Run) -> dict[str, Any]:
         "doubled contacts": int(np.maximum(per_step - 1, 0).sum()),
         "steps off the facets": int(np.sum(per_step[first:] == 0)), "energy lost [J]": float(lost.sum()),
         "energy lost, share of the fall": float(lost.sum()) / fall,
-        "largest speed": float(np.hypot(run.v[:, 0], run.v[:, 1]).max()),
+        "on return": int(np.sum(per_step[run.impacts.step[later] - 1] == 0)),
         "times": (run.impacts.step[later] * run.dt).tolist(),
         "shares": [sum(losses[:count]) / fall for count in range(1, len(losses) + 1)],
     }  # fmt: skip
@@ -98,7 +116,7 @@ def filters(table: Table) -> Part:
     return Part.of(
         "C18: false collisions of a ball that rolls in the faceted socket. The contact damping is "
         f"{', '.join(f'{b:g}' for b in both['damping'])} N s/m; the filter distances exceed the "
-        f"{1e3 * EDGE_JUMP:.1f} mm between contacts on neighbouring facets", f"for these dampings: {counts}",
+        f"{1e3 * edge_jump():.1f} mm between contacts on neighbouring facets", f"for these dampings: {counts}",
         "none with both filters",
         REFUTED if len(left) == len(both.rows) else MIXED if left else REPRODUCED,
         miss="a ball that rolls over facets collides falsely in spite of the contact filters at a damping of "

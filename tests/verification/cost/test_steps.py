@@ -14,6 +14,8 @@ from verification.cost.growth import (
     ALLOWED,
     FACTORED,
     FACTORS,
+    MILLISECOND,
+    PAPER_STEP,
     SIZES,
     fitted,
     most_contacts,
@@ -87,8 +89,9 @@ def test_robots_are_timed_in_both_forms(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_the_most_contacts_are_the_last_in_time() -> None:
-    keys = ("method", "coordinates", "contacts", "late calls")
-    rows = [("a", 3, 6, 0), ("a", 3, 12, ALLOWED), ("a", 3, 30, ALLOWED + 1), ("b", 3, 6, 9)]
+    keys = ("method", "deadline", "coordinates", "contacts", "late calls")
+    rows = [("a", MILLISECOND, 3, 6, 0), ("a", MILLISECOND, 3, 12, ALLOWED), ("a", MILLISECOND, 3, 30, ALLOWED + 1),
+            ("a", PAPER_STEP, 3, 30, 0), ("b", MILLISECOND, 3, 6, 9)]  # fmt: skip
     trials = table_from(dict(zip(keys, row, strict=True)) for row in rows)
     assert most_contacts(trials) == {"a": {3: 12}, "b": {3: 0}}
 
