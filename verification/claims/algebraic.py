@@ -46,19 +46,15 @@ class Measure(NamedTuple):
     bound: Callable[[Batch], float] | None = None
 
 
-Draw = Callable[[Family, int, int], Iterator[ImpactCase]]
-
-
 def batches(
-    key: str, question: str, *, place: str, quantity: str, tolerance: str, families: Sequence[Family],
-    restitutions: Sequence[float], impacts: Mapping[str, int], parts: Mapping[str, Measure],
-    exact: tuple[Sequence[Family], Sequence[float]] = ((), ()), says: str, draw: Draw = draw_of_rank,
-    roles: Mapping[str, str] | None = None, **more: Any,
+    key: str, question: str, *, families: Sequence[Family], restitutions: Sequence[float], impacts: Mapping[str, int],
+    parts: Mapping[str, Measure], exact: tuple[Sequence[Family], Sequence[float]] = ((), ()), says: str,
+    draw: Callable[[Family, int, int], Iterator[ImpactCase]] = draw_of_rank, **more: Any,
 ) -> Check:  # fmt: skip
     """Return a claim on batches of random impacts.
 
     impacts : number of impacts in one batch, by depth; exact : families and e of the parts in rational arithmetic
-    says : the sentence, with the name of a part in braces where its worst error stands; roles, more : as in Check
+    says : the sentence, with the name of a part in braces where its worst error stands; more : as in Check
     """
     plain, rational = ([part for part in parts if (parts[part].bound is None) is kind] for kind in (False, True))
     cases = [*product(families, restitutions, plain), *product(*exact, rational)]
@@ -76,10 +72,9 @@ def batches(
         }  # fmt: skip
 
     return Check(
-        key=key, question=question, place=place, quantity=quantity, tolerance=tolerance, cases=lambda study: cases,
-        row=row, parts=["part"], counts=["impacts"], says=lambda table: says.format_map(_Worst(table)),
-        conditions=["coordinates", "contacts", "condition number", "restitution"], roles=roles or {},
-        **{"holds": within_bound} | more,
+        key=key, question=question, cases=lambda study: cases, row=row, parts=["part"], counts=["impacts"],
+        says=lambda table: says.format_map(_Worst(table)), **{"holds": within_bound} | more,
+        conditions=["coordinates", "contacts", "condition number", "restitution"],
     )  # fmt: skip
 
 
@@ -134,12 +129,8 @@ def energy_gains(batch: Batch) -> Floats:
     return gain + uncertainty
 
 
-def _largest_exact_gain(batch: Batch) -> float:
-    impacts = (exact_impact(*case.arrays, Fraction(batch.restitution)) for case in batch.impacts)
-    return worst(max(float(impact.energy_after - impact.energy_before), 0.0) for impact in impacts)
-
-
-NEVER_GAINS = Measure(_largest_exact_gain)  # the theorem itself: (21) without rounding
+NEVER_GAINS = Measure(lambda batch: worst(max(float(impact.energy_after - impact.energy_before), 0.0) for impact in (
+    exact_impact(*case.arrays, Fraction(batch.restitution)) for case in batch.impacts)))  # the theorem: no rounding
 
 
 # C01, C02: the energy lost against the quadratic form of (18) and (24)
@@ -149,8 +140,7 @@ EXACTLY_PASSIVE = "kinetic energy does not rise, in rationals"
 WITH_HALF = "loss is ½(1 − e²) times the form"
 AS_PRINTED = "loss is (1 − e²) times the form"
 EXACT_LOSS = "loss is ½(1 − e²) times the form, in rationals"
-CAN_GAIN = ("The engine is made never to gain. Formula (21) evaluated as printed in doubles can gain (page Passive in "
-            "floating point).")  # fmt: skip
+CAN_GAIN = "By design the engine never gains; in doubles the printed (21) can (page Passive in floating point)."
 
 
 def losses(key: str, question: str, place: str, families: Sequence[Family], impacts: Mapping[str, int]) -> Check:
@@ -189,26 +179,23 @@ def _tells(row: Row) -> bool | None:
 def _halved(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
     """Yield impacts as `draw_of_rank`, but with velocities of which an impact with e = 0 takes half of the energy."""
     for case in draw_of_rank(family, count, seed):
-        mass, rows, v = case.arrays
-        along = np.linalg.solve(mass, rows[: case.rank].T @ np.linalg.solve(_delassus(case), rows[: case.rank] @ v))
-        taken, kept = kinetic_energy(mass, along), kinetic_energy(mass, v - along)
-        yield replace(case, velocity=v - along + along * np.sqrt(kept / taken) if kept > 1e-9 * taken else v)
+        taken, rest = _taken(case), case.velocity - _taken(case)
+        share = kinetic_energy(case.mass_matrix, rest) / kinetic_energy(case.mass_matrix, taken)
+        yield replace(case, velocity=rest + taken * np.sqrt(share)) if share > 1e-9 else case
 
 
 def _misfit(batch: Batch, factor: float) -> float:
-    """Largest |loss − factor (1 − e²) form|, relative to the form."""
-    forms = _shares(batch)
+    """Largest |loss − factor (1 − e²) vᵀJᵀW†Jv|, relative to this form, which is twice the energy of `_taken`."""
+    forms = np.array([2.0 * kinetic_energy(case.mass_matrix, _taken(case))
+                      / kinetic_energy(case.mass_matrix, case.velocity) for case in batch.impacts])  # fmt: skip
     return worst(np.abs(energy_gains(batch) / forms + factor * (1.0 - batch.restitution**2)))
 
 
-def _shares(batch: Batch) -> Floats:
-    """vᵀ Jᵀ W† J v with W = J M⁻¹ Jᵀ, from the independent rows, relative to the energy before the impact."""
-    forms, energy = [], []
-    for case in batch.impacts:
-        closing = case.contact_jacobian[: case.rank] @ case.velocity
-        forms.append(float(closing @ np.linalg.solve(_delassus(case), closing)))
-        energy.append(kinetic_energy(case.mass_matrix, case.velocity))
-    return np.asarray(np.array(forms) / np.array(energy))
+def _taken(case: ImpactCase) -> Floats:
+    """M⁻¹JᵀW⁻¹J v with the independent rows: the velocity that an impact with e = 0 takes."""
+    rows = case.contact_jacobian[: case.rank]
+    impulses = np.linalg.solve(_delassus(case), rows @ case.velocity)
+    return np.asarray(np.linalg.solve(case.mass_matrix, rows.T @ impulses))
 
 
 def _delassus(case: ImpactCase) -> Floats:

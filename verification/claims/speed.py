@@ -9,19 +9,8 @@ import numpy as np
 
 from verification.check import Check, Study
 from verification.clock import Times, sampler, take_turns
+from verification.cost import growth
 from verification.cost.calls import kernel_call, lemke_call, solver_call
-from verification.cost.growth import (
-    ALLOWED,
-    CONTACTS,
-    COORDINATES,
-    DEADLINES,
-    FACTORED,
-    MILLISECOND,
-    PRINTED_UP_TO,
-    TITLES,
-    haptic_rate,
-    most_contacts,
-)
 from verification.cost.problems import patch, pile
 from verification.finding import BEYOND
 from verification.region import Region
@@ -37,21 +26,21 @@ class Sizes(NamedTuple):
 
     coordinates: int
     method: str
-    contacts: tuple[int, ...] = CONTACTS
+    contacts: tuple[int, ...] = growth.CONTACTS
 
 
 def _fresh_sizes(study: Study, region: Region) -> Iterator[Sizes]:
     """Yield fresh sizes inside a region."""
     rng = np.random.default_rng(study.seed)
-    ends = (region.ends("coordinates", COORDINATES), region.ends("contacts", CONTACTS))
+    ends = (region.ends("coordinates", growth.COORDINATES), region.ends("contacts", growth.CONTACTS))
     for _ in range(FRESH_SIZES):
         d, c = (round(low * (high / low) ** rng.random()) for low, high in ends)
-        yield from (Sizes(d, method, (c,)) for method in TITLES if method == FACTORED or c <= PRINTED_UP_TO)
+        yield from (Sizes(d, method, (c,)) for method in growth.TITLES)
 
 
 def _rate_says(table: Table) -> str:
-    texts = [f"{method} in {deadline}: " + ", ".join(f"{count} at d = {d}" for d, count in most.items())
-             for deadline in DEADLINES for method, most in most_contacts(table, deadline).items()]  # fmt: skip
+    texts = [f"{method} in {deadline}: {', '.join(f'{count} at d = {d}' for d, count in most.items())}"
+             for deadline in growth.DEADLINES for method, most in growth.most_contacts(table, deadline).items()]
     return ("The paper leaves this question open. On this machine, the largest number of contacts at which 99.9 % of "
             f"the impacts are in time, with d coordinates, is: {'; '.join(texts)}. The times are CPU times of the "
             "thread; they do not show that a real-time loop keeps the deadline.")  # fmt: skip
@@ -65,11 +54,11 @@ C19 = Check(
     "paper: a deadline of 1 ms, and the engine's factored form, which is compiled and forms no pseudo-inverse. Once a "
     "size is too slow, larger sizes are not tried.",
     tolerance="At most one call in a thousand is late. A size that fails is tried up to three times.",
-    roles={TITLES[FACTORED]: BEYOND, MILLISECOND: BEYOND},
-    cases=lambda study: [Sizes(d, method) for d in COORDINATES for method in TITLES], draw=_fresh_sizes,
-    row=lambda study, case: haptic_rate(case.coordinates, case.method, case.contacts, failures=study.failures),
+    roles={growth.TITLES[growth.FACTORED]: BEYOND, growth.MILLISECOND: BEYOND},
+    cases=lambda study: [Sizes(d, method) for d in growth.COORDINATES for method in growth.TITLES], draw=_fresh_sizes,
+    row=lambda study, case: growth.haptic_rate(case.coordinates, case.method, case.contacts, failures=study.failures),
     says=_rate_says,
-    holds=lambda row: bool(row["late calls"] <= ALLOWED), parts=["method", "deadline"],
+    holds=lambda row: bool(row["late calls"] <= growth.ALLOWED), parts=["method", "deadline"],
     conditions=["coordinates", "contacts"], timed=["late calls", "time"], timed_rows=True,
     axes=("contacts", "coordinates", "method"),
 )  # fmt: skip
@@ -80,11 +69,9 @@ C19 = Check(
 PILE = "independent contacts of a pile"
 PROBLEMS = {"redundant contacts of a patch": patch, PILE: pile}
 SIZES = (*range(1, 13), 16, 24, 32, 48, 64, 96, 128, 300)
-# Where the arrays of an impact lie in memory changes its ratio by up to 40 %. So several impacts are drawn for each
-# size, each in arrays of its own. Their median then moved by up to 12 % between six processes on a busy machine (once
-# by 19 %). The outer quartile must be beyond CLEAR, so that the median is 13 % away from 1 or more.
-DRAWS, ROUNDS = 4, {"quick": 2, "full": 4}
-CLEAR = 1.1
+# Where the arrays of an impact lie in memory changes its ratio by up to 40 %, so each size has several draws, each in
+# arrays of its own. Their median then moves by up to 12 % between processes on a busy machine (once by 19 %).
+DRAWS, ROUNDS, CLEAR = 4, {"quick": 2, "full": 4}, 1.1
 FRESH, REPEATED = 12, 2  # number of sizes inside a region, and of fresh trials of each size
 SHOWN = (1, 6, 16, 64, 300)  # contacts whose ratios the sentence gives
 TIMES = ("decades", "ratio", "lower quartile", "upper quartile")
@@ -138,11 +125,10 @@ def _ratio_says(table: Table) -> str:
         rows = table.where(problem=part)
         shown = "; ".join(f"{row['ratio']:.2g} with {row['contacts']}" for row in rows.records()
                           if row["ratio"] is not None and row["contacts"] in SHOWN)  # fmt: skip
-        clear = [f"{len(found)} sizes clearly {word} 1 ({min(found)} to {max(found)} contacts)"
-                 for outcome, word in ((True, "above"), (False, "below"))
-                 if (found := rows.that(outcome).column("contacts"))]  # fmt: skip
-        texts.append(f"For {part} it is {shown}. It is at {', at '.join([*clear, 'no other size'][:2])}; "
-                     f"{len(rows.rows) - len(rows.decided)} of {len(rows.rows)} sizes cannot tell.")  # fmt: skip
+        above, below = ([len(found), f"({min(found)} to {max(found)} contacts)" if found else ""] for found in (
+            rows.that(outcome).column("contacts") for outcome in (True, False)))  # fmt: skip
+        texts.append(f"For {part} it is {shown}. It is clearly above 1 at {above[0]} sizes {above[1]}, clearly below "
+                     f"at {below[0]} {below[1]}, and {rows.holds.count(None)} sizes cannot tell.")  # fmt: skip
     return ("The ratio is the time of one frictionless impact by Lemke's method over that by IAPB, both compiled. "
             f"{' '.join(texts)} The paper's scene has at most six collisions at once. The paper speaks of whole time "
             "steps with constraint stabilization. Such steps are timed on the page Against complementarity (table time "
@@ -154,8 +140,7 @@ C22 = Check(
     place="Section II, about whole time steps",
     quantity="CPU time of a frictionless impact by complementarity, divided by that of IAPB. Both are compiled and "
     "timed in turns in one run, in random order, on several impacts of each size. The impacts have 1 to 300 contacts "
-    "on a patch (all but three redundant) or in a pile (none redundant), and both methods have the same v⁺. Calls from "
-    "Python are not part of the claim.",
+    "on a patch (all but three redundant) or in a pile (none redundant), and both methods have the same v⁺.",
     tolerance="A trial holds if the lower quartile of the ratios is at least 1.1, and fails if the upper quartile is "
     "at most 1/1.1, so that the median is about 13 % from 1; in between it cannot tell. Between processes on a busy "
     "machine the median of a size moved by up to 12 % (once by 19 %).",

@@ -125,41 +125,34 @@ def haptic_rate(
 ) -> Iterator[Row]:
     """Test a method at d coordinates; increase the contacts until more than ALLOWED calls miss every deadline.
 
-    The engine's method is tested at 1 kHz only. Yield one row per trial: the number of calls beyond a deadline in the
-    best attempt, and the median time of a call. The rank of the rows is two thirds of d.
+    The engine's method is tested at 1 kHz only. Yield one row per trial: the number of calls beyond a deadline and the
+    median time of a call. The rank of the rows is two thirds of d.
     """
-    going = {name: DEADLINES[name] for name in (DEADLINES if method == PRINTED else (MILLISECOND,))}
+    going = list(DEADLINES) if method == PRINTED else [MILLISECOND]
     for c in contacts:
         with one_thread():
-            found = attempt(f"{c} contacts in {d} coordinates by {TITLES[method]}",
-                            partial(late_calls, method, d, c, calls, tuple(going.values())), failures)  # fmt: skip
-        if found is not None:
-            late, time = dict(zip(going, found[0], strict=True)), 1e6 * found[1]
-            yield from ({"method": TITLES[method], "deadline": name, "coordinates": d, "contacts": c,
-                         "late calls [of 1000]": late[name], "time [µs]": time} for name in going)  # fmt: skip
-            going = {name: going[name] for name in going if late[name] <= ALLOWED}
-            if not going:
-                return
+            times = attempt(f"{c} contacts in {d} coordinates by {TITLES[method]}", partial(
+                call_times, method, d, c, calls, max(map(DEADLINES.__getitem__, going))), failures) or []  # fmt: skip
+        late = {name: sum(time > DEADLINES[name] for time in times) for name in going if times}
+        yield from ({"method": TITLES[method], "deadline": name, "coordinates": d, "contacts": c,
+                     "late calls [of 1000]": late[name], "time [µs]": 1e6 * float(np.median(times))} for name in late)
+        going = [name for name in going if late.get(name, 0) <= ALLOWED]
+        if not going:
+            return
 
 
-def late_calls(method: str, d: int, c: int, calls: int, deadlines: Sequence[float]) -> tuple[list[int], float]:
-    """Return the number of late calls for each deadline, the fewest of all attempts, and the median time [s].
-
-    An attempt stops at more than ALLOWED calls beyond the last deadline to be met. Another attempt follows only if the
-    median call met a deadline that too many calls missed.
-    """
-    call, late = _call(method, d, c), [calls] * len(deadlines)
+def call_times(method: str, d: int, c: int, calls: int, deadline: float) -> list[float]:
+    """Return the times of an attempt [s], which stops at more than ALLOWED late calls; it is the first one in time, or
+    the first whose median call is late, or the last."""
+    call = _call(method, d, c)
     for _ in range(_ATTEMPTS):
-        times, missed = list[float](), 0
-        while len(times) < calls and missed <= ALLOWED:
+        late, times = 0, list[float]()
+        while len(times) < calls and late <= ALLOWED:
             times.append(seconds(call))
-            missed += times[-1] > max(deadlines)
-        late = [min(least, sum(time > deadline for time in times))
-                for least, deadline in zip(late, deadlines, strict=True)]  # fmt: skip
-        median = float(np.median(times))
-        if not any(count > ALLOWED and median <= limit for count, limit in zip(late, deadlines, strict=True)):
+            late += times[-1] > deadline
+        if late <= ALLOWED or np.median(times) > deadline:
             break
-    return late, median
+    return times
 
 
 def most_contacts(trials: Table, deadline: str = MILLISECOND) -> dict[str, dict[int, int]]:

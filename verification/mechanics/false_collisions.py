@@ -53,9 +53,9 @@ def _faceted(facets: int) -> Scene:
     def point(radius: float, number: float) -> list[float]:
         return [radius * math.sin(number * angle), -radius * math.cos(number * angle)]
 
-    walls = [{"name": f"facet_{number}", "kind": "polygon", "vertices": [
-        point(radius, end) for radius, end in ((RADIUS, number - 0.5), (1.1 * RADIUS, number - 0.5),
-                                               (1.1 * RADIUS, number + 0.5), (RADIUS, number + 0.5))]}
+    corners = (1.0, -0.5), (1.1, -0.5), (1.1, 0.5), (1.0, 0.5)
+    walls = [{"name": f"facet_{number}", "kind": "polygon",
+              "vertices": [point(RADIUS * out, number + side) for out, side in corners]}
              for number in range(-facets, facets + 1)]  # fmt: skip
     touching = RADIUS * math.cos(0.5 * angle) - BALL_RADIUS + 1e-6  # by a micrometre
     start = point(touching, -round(STEEP / angle))
