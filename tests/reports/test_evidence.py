@@ -207,7 +207,7 @@ def of_claims(patch: Patch, folder: Path, failures: list[Failure]) -> None:
                                                 (arm.PLACES[0], arm.ANGLES[0])))  # fmt: skip
     first, second = topics.checked_claims("claims", Runner(folder), "quick", nothing, failures)
     assert (first.verdict, first.tables["C01"].rows) == (NOT_COMPUTED, ())
-    assert len(second.tables["C07"].rows) == 2 * len(arm.PLACES) * len(arm.ANGLES) - 3
+    assert len(second.tables["C07"].rows) == 2 * len(arm.PLACES) * len(arm.ANGLES) - 2
 
 
 def of_effects(patch: Patch, folder: Path, failures: list[Failure]) -> None:

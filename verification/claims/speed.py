@@ -123,12 +123,13 @@ def _ratio_says(table: Table) -> str:
     texts = []
     for part in dict.fromkeys(table.column("problem")):
         rows = table.where(problem=part)
-        shown = "; ".join(f"{row['ratio']:.2g} with {row['contacts']}" for row in rows.records()
-                          if row["ratio"] is not None and row["contacts"] in SHOWN)  # fmt: skip
-        above, below = ([len(found), f"({min(found)} to {max(found)} contacts)" if found else ""] for found in (
-            rows.that(outcome).column("contacts") for outcome in (True, False)))  # fmt: skip
-        texts.append(f"For {part} it is {shown}. It is clearly above 1 at {above[0]} sizes {above[1]}, clearly below "
-                     f"at {below[0]} {below[1]}, and {rows.holds.count(None)} sizes cannot tell.")  # fmt: skip
+        shown = {row["contacts"]: f"{row['ratio']:.2g}" for row in rows.records()
+                 if row["ratio"] is not None and row["contacts"] in SHOWN}  # fmt: skip
+        above, below = (f"with {min(found)} to {max(found)} contacts ({len(found)} sizes)" if found else "at no size"
+                        for found in (rows.that(outcome).column("contacts") for outcome in (True, False)))
+        texts.append(f"For {part} it is {', '.join(shown.values())} with {', '.join(map(str, shown))} contacts. It is "
+                     f"clearly above 1 {above}, and clearly below 1 {below}; {rows.holds.count(None)} of "
+                     f"{len(rows.rows)} sizes cannot tell.")  # fmt: skip
     return ("The ratio is the time of one frictionless impact by Lemke's method over that by IAPB, both compiled. "
             f"{' '.join(texts)} The paper's scene has at most six collisions at once. The paper speaks of whole time "
             "steps with constraint stabilization. Such steps are timed on the page Against complementarity (table time "
