@@ -160,9 +160,11 @@ class Check:
 
     def conclude(self, table: Table, study: Study | None = None) -> Finding:
         """Return the finding on a claim from its judged table; without a study it draws no fresh cases."""
-        parts = [
-            replace(judge_part(name, rows, self._fresh(study, name)), role=_of_part(self.roles, name),
-                    named=_of_part(self.named, name)) for name, rows in by_part(table).items()]  # fmt: skip
+        parts = []
+        for name, rows in by_part(table).items():
+            role = _of_part(self.roles, name)
+            judged = judge_part(name, rows, None if role else self._fresh(study, name))  # a role decides nothing
+            parts.append(replace(judged, role=role, named=_of_part(self.named, name)))
         return self._found(str(self.says(table)) if self.says else "", parts, table)
 
     def not_computed(self) -> Finding:

@@ -25,7 +25,7 @@ Result = TypeVar("Result")
 REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
     "reproduced", "reproduced where", "mixed", "refuted", "not testable here", "not computed in this run",
 )  # fmt: skip
-# A claim that fails in more trials than it holds in is refuted, not "true with exceptions".
+# A claim without a confirmed range that fails in more trials than it holds in is refuted, not "true with exceptions".
 LEAST_SHARE = 0.5
 # A part of a claim is the paper's statement (""), a formula as printed whose failure is an erratum, or ours, beyond the
 # paper. Only the paper's statement decides the claim.
@@ -229,11 +229,12 @@ def verdict_of_law(holds: Iterable[bool | None]) -> str:
 def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None = None) -> Part:
     """Return the verdict on the trials of one part.
 
-    A mixed part becomes "reproduced where" if a region is confirmed. The region is found on one half of the trials; the
-    claim must hold in all trials of the other half that lie inside the region, and in all that `fresh` draws inside. At
-    least LEAST_CONFIRMING trials must confirm the region: fresh trials if they can be drawn, else those of the other
-    half. If all trials hold but fewer than LEAST_DECIDED cases have an outcome, the part is not testable here. A part
-    with failures is mixed or refuted, however few trials there are.
+    A part that fails becomes "reproduced where" if a region is confirmed. A region is sought if the part is mixed or
+    holds in LEAST_DECIDED trials, since its share of the trials depends on which conditions were chosen. The region is
+    found on one half of the trials; the claim must hold in all trials of the other half that lie inside the region, and
+    in all that `fresh` draws inside. At least LEAST_CONFIRMING trials must confirm the region: fresh trials if they can
+    be drawn, else those of the other half. If all trials hold but fewer than LEAST_DECIDED cases have an outcome, the
+    part is not testable here. A part with failures is mixed or refuted, however few trials there are.
     """
     verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
     held, decided, total = trials.holds.count(True), len(trials.decided), len(trials.rows)
@@ -241,9 +242,10 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
     if 0 < decided < total:
         said = f"{said}; {total - decided} of {total} cannot tell"
     part = Part("", verdict, name, held, decided, total - decided, None, _where_it_fails(trials), timed)
-    if verdict == MIXED:
+    if verdict == MIXED or (verdict == REFUTED and held >= LEAST_DECIDED):
         region, tried = confirmed(trials, fresh)
-        part, said = replace(part, region=region, verdict=WHERE if region else MIXED), f"{said}; {tried}"
+        most = "fails in most trials; " if verdict == REFUTED else ""
+        part, said = replace(part, region=region, verdict=WHERE if region else verdict), f"{said}; {most}{tried}"
     judged = trials.only(held is not None for held in trials.holds)
     counts = [sum(count or 0 for count in judged.column(column.key)) for column in trials.columns if column.cases]
     cases = max(decided, *counts, 0)

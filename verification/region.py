@@ -28,10 +28,11 @@ _DECADES = 1e3  # a condition with a larger ratio of its ends is measured in dec
 class Region:
     """Region in which a part holds: bounds on one or two conditions. The claim holds in every trial inside.
 
-    bounds : condition, its unit, lowest and highest value; None if the region extends to the end of the tested range
+    bounds : condition, its unit, lowest and highest value, which may be equal; None if the region extends to the end of
+        the tested range
     searched : number of trials inside, from the half in which the region was found; others : from the other half
     fresh : number of trials drawn for the confirmation
-    share : share of the tested range that the region covers, by length or by decades
+    share : share of the tested range that the region covers, by length or by decades; 0 for a single value
     """
 
     bounds: tuple[tuple[str, str, float | None, float | None], ...]
@@ -57,6 +58,8 @@ class Region:
 
 def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
     key = key.replace("_", " ")
+    if low == high:
+        return f"{key} = {low:g} {unit}".rstrip()
     if low is None:
         return f"{key} <= {high:g} {unit}".rstrip()
     return f"{key} >= {low:g} {unit}".rstrip() if high is None else f"{low:g} <= {key} <= {high:g} {unit}".rstrip()
@@ -81,11 +84,12 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
     if False in drawn.holds:
         return None, f"no range of conditions is confirmed: {region} fails in {_failing(drawn)} fresh trials"
     region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
-    counts = (f"{region.searched} trials that led to this range, {region.others} other trials and {region.fresh} fresh "
-              "trials hold")  # fmt: skip
+    new = f" and {region.fresh} fresh" if fresh else ""
+    counts = f"{region.searched} trials that led to this range, {region.others} other{new} trials hold"
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
         return None, f"no range of conditions is confirmed: where {region}, only {counts}"
-    return region, f"where {region} ({region.share:.0%} of the tested range), all {counts}"
+    covered = f" ({region.share:.0%} of the tested range)" if region.share else ""
+    return region, f"where {region}{covered}, all {counts}"
 
 
 def _failing(trials: Table) -> str:
@@ -95,7 +99,7 @@ def _failing(trials: Table) -> str:
 def search_region(trials: Table) -> Region | None:
     """Return the region, bounded in one or two conditions, with most trials and no failure; None if there is none.
 
-    The search tries every interval between values of a condition, alone and with every interval of every other
+    The search tries every value and every interval between values of a condition, alone and with those of every other
     condition. Among regions with equally many trials it takes the one with the fewest bounds, then the first in the
     order of the columns. It adds a second condition only if the region then keeps at least 1.5 times as many trials,
     because the simpler region generalizes better.
@@ -124,7 +128,7 @@ class _Interval(NamedTuple):
 
     @property
     def ends(self) -> int:
-        return (self.low is not None) + (self.high is not None)
+        return len({self.low, self.high} - {None})
 
 
 def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, int, tuple[_Interval, ...]]:
@@ -141,8 +145,8 @@ def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tup
 
 
 def _intervals(column: Column, trials: Table) -> list[_Interval]:
-    """All intervals between two values of a condition, including the unbounded one; empty if a value is no number, or
-    if there is only one value."""
+    """All values of a condition and all intervals between two of them, including the unbounded one; empty if a value is
+    no number, or if there is only one value."""
     values = trials.column(column.key)
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return []
@@ -152,7 +156,7 @@ def _intervals(column: Column, trials: Table) -> list[_Interval]:
     scale = math.log10 if seen[0] > 0 and seen[-1] / seen[0] >= _DECADES else float
     length = scale(seen[-1]) - scale(seen[0])
     return [
-        _Interval(column.key, column.unit, low if i else None, high if j < len(seen) - 1 else None,
+        _Interval(column.key, column.unit, low if i or i == j else None, high if j < len(seen) - 1 or i == j else None,
                   (scale(high) - scale(low)) / length, (places >= low) & (places <= high))
-        for i, low in enumerate(seen) for j, high in enumerate(seen) if i < j
+        for i, low in enumerate(seen) for j, high in enumerate(seen) if i <= j
     ]  # fmt: skip

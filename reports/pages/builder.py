@@ -184,7 +184,8 @@ def counted(part: Part) -> str:
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
     cases = f" ({part.cases} cases in all)" if part.cases else ""
     region = part.region
-    where = (f" over all conditions; the stated range covers {region.share:.0%} of them: {region.searched} trials led "
+    share = f" covers {region.share:.0%} of them" if region and region.share else ""
+    where = (f" over all conditions; the stated range{share}: {region.searched} trials led "
              f"to it, {region.others + region.fresh} others confirm it") if region else ""  # fmt: skip
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 

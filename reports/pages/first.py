@@ -13,7 +13,7 @@ from typing import NamedTuple
 from reports.pages.quantities import peg_step
 from reports.pages.records import Evidence
 from verification.claims.conditions import Condition
-from verification.claims.peg import ALL_THREE, LARGE, closest_at, small_tilts
+from verification.claims.peg import LARGE, closest_in, small_tilts
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
@@ -59,12 +59,12 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     """Return the lines of the first screen that have findings."""
     claims = {claim.key: claim for claim in evidence.claims}
     topics = {topic.key: topic for topic in evidence.topics if topic.computed}
-    found = [*_forces(claims.get("C11")), *_path(claims.get("C10"))]
+    found = [*_forces(claims.get("C11"), claims.get("C14")), *_path(claims.get("C10"))]
     counts = [f"{count} {words}" for count, words in count_claims(evidence.claims).values()]
-    trials = sum(part.decided + part.unknown for claim in evidence.claims for part in claim.parts)
-    told = [Fact("Tested", f"{len(claims)} claims of the paper, each under many conditions ({trials:,} trials): "
-                 f"{'; '.join(counts)}.", "claims")
-            ] if claims else []  # fmt: skip
+    parts = [part for claim in evidence.claims for part in claim.parts]
+    decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
+    told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials decide these "
+                 f"verdicts, {unknown:,} others cannot tell.", "claims")] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
         if text := " ".join(said for held, said in found if held is wanted):
             told.append(Fact(label, text, "C11" if wanted else "C10", kind))
@@ -87,30 +87,33 @@ def made_from(evidence: Evidence) -> str:
     return ", ".join(filter(None, (commit, known.get("date"), known.get("cpu"))))
 
 
-def _forces(claim: Finding | None) -> Iterator[tuple[bool, str]]:
-    table = claim.tables.get("C11") if claim else None
+def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bool, str]]:
+    table, limits = (each.tables.get(each.key) if each else None for each in (claim, limited))
     if table is None or "part" not in table.keys:
         return
-    rows = [row for row in table.where(part=LARGE).records() if row["coordinate"] != "theta" and row["PB"]]
-    if rows:
-        ratio = median(row["IAPB"] / row["PB"] for row in rows)
-        yield ratio > 1.0, (f"At a new contact, the force on the hand is {ratio:.2g} times as large with impulses as "
-                            f"with springs alone (median of {len(rows)} cases).")  # fmt: skip
+    found = {"if the device can give any force": table.where(part=LARGE)}
+    if limits is not None and "force_limit" in limits.keys:
+        found["on the paper's device, which gives at most 15 N"] = limits.where(force_limit=1.0)
+    ratios = {device: [row["IAPB"] / row["PB"] for row in rows.records() if row["coordinate"] != "theta" and row["PB"]]
+              for device, rows in found.items()}  # fmt: skip
+    said = [f"{median(each):.2g} times as large {device} (median of {len(each)} cases)"
+            for device, each in ratios.items() if each]  # fmt: skip
+    if said:
+        yield all(median(each) > 1.0 for each in ratios.values() if each), (
+            f"Compared with springs alone, the largest force on the hand is with impulses {', and '.join(said)}.")
 
 
 def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
-    """Yield how often the path is the closest: judged by position and rotation together, and in each at small tilts."""
-    parts = {part.name: part for part in claim.parts if not part.role} if claim else {}
-    if claim is None or (whole := parts.pop(ALL_THREE, None)) is None:
+    """Yield how often the path is the closest in each quantity, and how often at small tilts."""
+    parts = [part for part in claim.parts if not part.role and part.decided] if claim else []
+    if claim is None or not parts:
         return
-    each = ", ".join(f"{part.named or name} in {part.held} of {part.decided}" for name, part in parts.items())
-    yield whole.verdict in (REPRODUCED, WHERE), (
-        "Over all starts, impulses bring the hand's path (position and rotation together) nearest to the path at a "
-        f"rigid wall in {whole.held} of {whole.decided} "
-        f"starts{f', always where {whole.region}' if whole.region else ''}. Each coordinate on its own: {each}. Starts "
-        "that are too close to call are not counted.")
-    if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)):
-        found = {name: closest_at(table, small)[name] for name in ("x", "y")}
+    each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
+    yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
+        "The paper shows one start, and its position is lost. Over all starts that we tested and that are not too "
+        f"close to call, impulses bring the hand's path nearest to the path at a rigid wall in {each}.")
+    if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
+        found = {name: closest_in(small)[name] for name in ("x", "y")}
         each = " and ".join(f"{name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
             f"If the pushed body, a peg, starts tilted by at most {degrees(Condition().tilt):.2f}°, impulses bring the "

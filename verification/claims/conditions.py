@@ -23,9 +23,10 @@ UNITS = {
 START = ("tilt", "clearance", "travel", "friction", "approach_velocity")  # conditions that most claims vary
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 
-# The conditions that each world ignores: one run of a world serves all values of these conditions.
+# The conditions that each world ignores: one run of a world serves all values of these conditions. The device's limits
+# act on PB, and on IAPB unless it renders in full.
 _RIGID_IGNORES = ("friction", "stiffness", "damping", "approach_velocity", "force_limit")
-IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("approach_velocity", "force_limit"), "IAPB": ()}
+IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("approach_velocity",), "IAPB": ()}
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Condition:
 
     def seen_by(self, world: str, rendering: str) -> Condition:
         """Return the condition with the default for every value that the world ignores."""
-        ignored = IGNORED[world] if rendering != "full" else (*IGNORED[world], "force_limit")
+        ignored = (*IGNORED[world], *(["force_limit"] if (world, rendering) == ("IAPB", "full") else []))
         return replace(self, **{name: getattr(Condition(), name) for name in ignored})
 
     def row(self, *names: str) -> dict[str, float]:

@@ -83,9 +83,9 @@ def trace_of(run: Run) -> Trace:
     )  # fmt: skip
 
 
-def settled_at(trace: Trace) -> int:
-    """Return the index of the state after which the device stays slower than SETTLED_SPEED; len(time) if never."""
-    moving = np.flatnonzero(np.any(np.abs(trace.device_velocity) > SETTLED_SPEED, axis=1))
+def settled_at(trace: Trace, factor: float = 1.0) -> int:
+    """Return the state after which the device stays slower than factor * SETTLED_SPEED; len(time) if never."""
+    moving = np.flatnonzero(np.any(np.abs(trace.device_velocity) > factor * SETTLED_SPEED, axis=1))
     return int(moving[-1]) + 1 if len(moving) else 0
 
 
@@ -95,6 +95,13 @@ def settling_time(trace: Trace) -> float | None:
     if state >= len(trace.time):
         return None
     return max(float(trace.time[state] - trace.time[min(trace.first_contact, len(trace.time) - 1)]), 0.0)
+
+
+def settling_times(trace: Trace) -> Floats:
+    """Return the times [s] from first contact until the device stays below 0.5, 1, 2 SETTLED_SPEED, or to the end."""
+    last = len(trace.time) - 1
+    states = [min(settled_at(trace, factor), last) for factor in (0.5, 1.0, 2.0)]
+    return np.maximum(trace.time[states] - trace.time[min(trace.first_contact, last)], 0.0)
 
 
 def comparison_window(traces: Sequence[Trace]) -> slice:
@@ -107,11 +114,6 @@ def comparison_window(traces: Sequence[Trace]) -> slice:
 def root_mean_square(trace: Trace, ideal: Trace, window: slice) -> Floats:
     """Return the RMS distance between the two device trajectories per coordinate (3,)."""
     return np.sqrt(np.mean((trace.device[window] - ideal.device[window]) ** 2, axis=0))
-
-
-def largest_distance(trace: Trace, ideal: Trace, window: slice) -> Floats:
-    """Return the largest distance between the two device trajectories per coordinate (3,)."""
-    return np.max(np.abs(trace.device[window] - ideal.device[window]), axis=0)
 
 
 def force_distance(trace: Trace, ideal: Trace, window: slice, order: int) -> Floats:
@@ -128,15 +130,30 @@ def peak_force(trace: Trace) -> Floats:
     return np.max(np.abs(trace.device_force), axis=0, initial=0.0)
 
 
-def resting_force(trace: Trace) -> Floats | None:
-    """Return the mean actuator force after settling (3,) [N, N m]; None if the device does not settle."""
-    state = settled_at(trace)
-    return None if state >= len(trace.device_force) else np.mean(trace.device_force[state:], axis=0)
+def unbalanced_force(trace: Trace, window: slice) -> Floats:
+    """Return the mean |F + F_hand| of the actuators in contact, outside steps with a collision (3,) [N, N m]; for x the
+    tool touches the right wall, for y the floor, for theta either."""
+    right, floor = (np.min(corner_gaps(trace.tool)[k::2], axis=0)[:-1] <= TOUCHING for k in (0, 1))
+    counted = np.column_stack([right, floor, right | floor])
+    counted[trace.impact_step] = False
+    apart = np.abs(trace.device_force + trace.hand_force)[window] * counted[window]
+    return np.asarray(np.sum(apart, axis=0) / np.maximum(np.sum(counted[window], axis=0), 1))
 
 
 def deepest_penetration(trace: Trace) -> float:
     """Return the largest overlap of tool and walls [m]."""
     return float(np.max(trace.penetration, initial=0.0))
+
+
+def device_overlap(trace: Trace) -> float:
+    """Return the largest overlap of the device's peg and the walls [m]: the violation of the constraints."""
+    return -float(np.min(corner_gaps(trace.device), initial=0.0))
+
+
+def separation_by_impacts(trace: Trace) -> Floats:
+    """Return by how much device and tool part in a step with a collision, at most, per coordinate (3,)."""
+    parted = np.abs(np.diff(trace.tool - trace.device, axis=0))
+    return np.max(parted[trace.impact_step], axis=0, initial=0.0)
 
 
 def largest_separation(trace: Trace) -> Floats:

@@ -5,10 +5,11 @@ import pytest
 
 from verification.claims import CLAIMS, algebraic, peg, socket, walls
 
-RENDERED = {"saturate": 3e-3, "scale": 2e-3, "spread": 1e-3, "impacts limited": 0.5}
+RENDERED = {"measure": "x", "ahead": 3e-5, "impacts limited": 0.5}
 TOGETHER = {"distance": 0.0, "angle": 1e-15, "impacts limited": 1.0}
 SETTLED = {"test": walls.WHEREVER, "impulses settle after": 0.2}
 LOSS = {"part": algebraic.WITH_HALF, "restitution": 0.5}
+AHEAD = {"IAPB": 1.5, "PB": 2.0}
 NEAR, FAR = 1e-4, 1e-3  # [m] or [rad]
 BEST, WORST = {"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}
 FILTERED = {"part": socket.BOTH, "false collisions without filters": 26, "false collisions": 1}
@@ -35,24 +36,26 @@ ROWS = [
     ("C11", BEST | {"part": peg.CLOSEST}, True),
     ("C11", {"part": peg.CLOSEST, "IAPB": FAR, "PB": FAR, "CBuc": NEAR}, False),
     ("C11", {"part": peg.LARGE, "IAPB": 5.0, "PB": 8.0, "CBuc": 8.0}, False),
-    ("C11", {"part": peg.BALANCE, "IAPB": 0.1, "hand": -0.32}, False),
-    ("C11", {"part": peg.BALANCE, "IAPB": None, "hand": -0.32}, None),
-    ("C12", RENDERED | {"part": peg.LEAST}, True),
-    ("C12", RENDERED | {"part": peg.MOST, "scale": 1.0}, False),
-    ("C12", RENDERED | {"part": peg.LEAST, "impacts limited": 0.0}, None),
+    ("C11", {"part": peg.BALANCE, "IAPB": 0.1, "PB": 0.02, "CBuc": 0.5}, False),
+    ("C11", {"part": peg.BALANCE, "IAPB": 0.01, "PB": 0.02, "CBuc": 0.0}, True),
+    ("C11", {"part": peg.BALANCE, "IAPB": 1e-18, "PB": 1e-19, "CBuc": 0.0}, None),
+    ("C12", RENDERED, True),
+    ("C12", RENDERED | {"ahead": -3e-5}, False),
+    ("C12", RENDERED | {"measure": "theta"}, None),
+    ("C12", RENDERED | {"measure": peg.SETTLING, "ahead": 0.0}, None),
+    ("C12", RENDERED | {"impacts limited": 0.0}, None),
     ("C13", {"coordinate": peg.PENETRATION, "IAPB": NEAR, "PB": FAR}, True),
     ("C13", {"coordinate": peg.PENETRATION, "IAPB": FAR, "PB": NEAR}, False),
     ("C14", {"coordinate": "x", "IAPB": 15.0, "PB": 5.0}, True),
     ("C14", {"coordinate": "x", "IAPB": 4.0, "PB": 5.0}, False),
     ("C14", {"coordinate": "theta", "IAPB": 1e-9, "PB": 0.0}, None),
-    ("C15", {"part": peg.SETTLES, "IAPB": 0.5, "PB": np.inf}, True),
-    ("C15", {"part": peg.SETTLES, "IAPB": np.inf, "PB": 2.0}, False),
-    ("C15", {"part": peg.SETTLES, "IAPB": 1.5, "PB": 1.5}, False),
-    ("C15", {"part": peg.SETTLES, "IAPB": np.inf, "PB": np.inf}, None),
-    ("C15", {"part": peg.FEWER, "IAPB": 2, "PB": 2}, False),
-    ("C15", {"part": peg.FEWER, "IAPB": 0, "PB": 0}, None),
-    ("C15", {"part": peg.NO_MORE, "IAPB": 2, "PB": 2}, True),
-    ("C15", {"part": peg.NO_MORE, "IAPB": 3, "PB": 2}, False),
+    ("C14", {"coordinate": "x", "IAPB": 4.5, "PB": 4.5}, None),
+    ("C15", AHEAD | {"part": peg.SETTLES, "ahead": 0.4}, True),
+    ("C15", AHEAD | {"part": f"{peg.SETTLES}, {peg.LARGER}", "ahead": -0.4}, False),
+    ("C15", AHEAD | {"part": peg.SETTLES, "ahead": 1e-3}, None),
+    ("C15", {"part": peg.FEWER, "IAPB": 2, "PB": 2, "ahead": 0}, False),
+    ("C15", {"part": peg.FEWER, "IAPB": 0, "PB": 0, "ahead": 0}, None),
+    ("C15", {"part": peg.FEWER, "IAPB": 0, "PB": 2, "ahead": 2}, True),
     ("C16", TOGETHER | {"rendering": "spread"}, True),
     ("C16", TOGETHER | {"rendering": "saturate"}, False),
     ("C16", TOGETHER | {"rendering": "scale", "distance": 1e-4}, False),
@@ -77,6 +80,11 @@ ROWS = [
     ("C22", {"ratio": 1.3, "lower quartile": 1.11, "upper quartile": 4.0}, True),
     ("C22", {"ratio": 0.8, "lower quartile": 0.2, "upper quartile": 0.9}, False),
 ]  # fmt: skip
+
+
+def test_a_difference_counts_only_if_all_thresholds_agree_on_its_sign():
+    assert [peg.agreed(each) for each in ([0.3, 0.1, 0.2], [-0.3, -0.1, -0.2], [0.3, -0.1, 0.2], 0.4)] == [
+        0.1, -0.1, 0.0, 0.4]  # fmt: skip
 
 
 @pytest.mark.parametrize(("claims", "row", "held"), ROWS)

@@ -1,16 +1,19 @@
 """The study: runs are injected, shared and sorted by what a world can see; swapped worlds refute the claims."""
 
+from dataclasses import replace
+
 import pytest
 
 from iapb import find_scene, load_scene
 from iapb.errors import ArgumentError
 from reference.worlds import run_world
 from verification.check import Study
-from verification.claims import check_claims, peg
+from verification.claims import CLAIMS, check_claims, peg
 from verification.claims.conditions import Condition, drawn, start_conditions
 from verification.claims.peg import trace
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED, WHERE
 from verification.region import Region
+from verification.scenes.measures import peak_force
 
 FEW = tuple(Condition(tilt, friction=0.1) for tilt in (0.0, *(0.1 + 0.01 * n for n in range(10))))
 SWAPPED = {"IAPB": "PB", "PB": "IAPB"}
@@ -66,6 +69,19 @@ def test_worlds_under_the_wrong_name_are_found_out(few):
     assert (right["C14"].verdict, right["C15"].verdict) == (WHERE, REPRODUCED)
     assert (wrong["C14"].verdict, wrong["C15"].verdict) == (REFUTED, REFUTED)
     assert wrong["C16"].verdict == NOT_TESTABLE  # a world without impulses reaches no limit
+
+
+def test_a_limited_device_clips_the_forces_of_both_laws():
+    asked, hard = Study(run_world), replace(Condition(), force_limit=0.2)
+    forces = {(world, limit): peak_force(trace(asked, replace(hard, force_limit=limit), world, rendering))
+              for world, rendering in (("PB", "full"), ("IAPB", "spread")) for limit in (0.2, 1.0)}  # fmt: skip
+    assert forces["PB", 0.2][:2] == pytest.approx([3.0, 3.0]) == forces["IAPB", 0.2][:2]
+    assert 3.0 < forces["PB", 1.0][0] < 10.0 < forces["IAPB", 1.0][0]
+
+
+def test_claims_against_rigid_worlds_have_no_friction():
+    for key, rough in (("C10", False), ("C11", False), ("C12", False), ("C13", False), ("C14", True), ("C15", True)):
+        assert any(start.friction for start in CLAIMS[key].cases(Study())) is rough
 
 
 def test_regions_that_overlap_share_the_starts_that_confirm_them():

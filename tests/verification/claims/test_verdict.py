@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from verification.check import Check
+from verification.check import Check, Study
 from verification.finding import (
     BEYOND,
     FAILS,
@@ -213,5 +213,24 @@ def test_a_region_of_random_outcomes_is_not_confirmed(share):
     assert found <= 5  # 0.85 ** 20 = 4 %
 
 
-def test_a_part_that_fails_in_more_than_half_is_refuted_whatever_its_region():
-    assert judge_part("x", trials(lambda row: row["tilt"] <= 0.1)).verdict == REFUTED
+def test_a_part_that_fails_in_most_trials_may_hold_in_a_range_and_says_both():
+    rare = lambda row: row["tilt"] <= 0.1  # noqa: E731
+    part = judge_part("x", trials(rare), drawn_by(rare))
+    assert (part.verdict, str(part.region)) == (WHERE, "tilt <= 0.1 rad")
+    assert "holds in 20 of 52 trials; fails in most trials; where tilt <= 0.1 rad" in part.sentence
+    few = judge_part("x", trials(lambda row: row["tilt"] <= 0.03), drawn_by(lambda row: row["tilt"] <= 0.03))
+    assert few.held < LEAST_DECIDED and (few.verdict, few.region) == (REFUTED, None)
+
+
+def test_a_range_may_be_a_single_value_and_fresh_trials_vary_the_others():
+    limited = lambda row: row["width"] == 2.0 or row["tilt"] == 0.0  # noqa: E731
+    found = trials(limited, widths=(1.0, 2.0))
+    part = judge_part("x", found, drawn_by(limited))
+    assert str(part.region) == "width = 2 m" and part.region.share == 0.0 and "tested range" not in part.sentence
+    assert judge_part("x", found, drawn_by(lambda row: row["tilt"] <= 0.2)).verdict == MIXED
+
+
+def test_a_part_that_decides_nothing_draws_no_fresh_trials():
+    claim = replace(CLAIM, roles={"x": BEYOND}, draw=lambda study, region: pytest.fail("drawn"))
+    rows = [{"part": "x", "tilt [rad]": n / 40, "error": float(n > 20)} for n in range(40)]
+    assert claim.conclude(claim.table_of(rows), Study()).parts[0].held == 21

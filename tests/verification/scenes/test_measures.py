@@ -1,5 +1,7 @@
 """Measures of trajectories, on traces written by hand whose answers are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,12 +11,14 @@ from verification.scenes.measures import (
     bounces,
     comparison_window,
     corner_gaps,
+    device_overlap,
     force_distance,
-    largest_distance,
     peak_force,
-    resting_force,
     root_mean_square,
+    separation_by_impacts,
     settling_time,
+    settling_times,
+    unbalanced_force,
 )
 
 STEPS, DT = 100, 0.01
@@ -46,7 +50,6 @@ def test_distances_are_taken_in_the_window():
     ours, ideal = trace(device=column(late, 1)), trace()
     assert root_mean_square(ours, ideal, slice(20, 60)) == pytest.approx([0.0, 2e-3, 0.0])
     assert root_mean_square(ours, ideal, slice(0, 40)) == pytest.approx([0.0, 2e-3 / np.sqrt(2), 0.0])
-    assert largest_distance(ours, ideal, slice(0, 21)) == pytest.approx([0.0, 2e-3, 0.0])
 
 
 def test_window_goes_from_the_first_contact_to_the_last_settling():
@@ -58,6 +61,9 @@ def test_window_goes_from_the_first_contact_to_the_last_settling():
 def test_settling_counts_from_the_first_contact():
     assert settling_time(trace(velocity=UNTIL_50, contact_at=10)) == pytest.approx(0.41)
     assert settling_time(trace(velocity=FOREVER)) is None
+    slowing = trace(velocity=column(1e-3 * 2.0 ** (2.5 - np.arange(STEPS + 1) / 20), 0), contact_at=10)
+    assert settling_times(slowing) == pytest.approx([0.6, 0.4, 0.2])  # below 0.5, 1 and 2 mm/s
+    assert settling_times(trace(velocity=FOREVER)) == pytest.approx([0.9] * 3)
 
 
 def test_a_spike_one_step_later_counts_by_its_impulse_and_not_by_its_square():
@@ -67,10 +73,28 @@ def test_a_spike_one_step_later_counts_by_its_impulse_and_not_by_its_square():
     assert peak_force(trace(force=late))[0] == 60.0
 
 
-def test_resting_force_is_the_mean_after_settling():
-    force = column(np.where(np.arange(STEPS) < 51, 9.0, -0.4), 1)
-    assert resting_force(trace(force=force, velocity=UNTIL_50)) == pytest.approx([0.0, -0.4, 0.0])
-    assert resting_force(trace(velocity=FOREVER)) is None
+def test_balance_is_judged_in_contact_and_outside_collisions():
+    """x touches the right wall from step 20 on, y never; step 30 collides, step 60 is out of balance by 5 N."""
+    x = np.where(np.arange(STEPS + 1) < 20, 0.05, 0.0105)
+    force = np.tile([0.32, 9.0, 0.0], (STEPS, 1)) + column(80.0 * np.eye(1, STEPS, 30)[0], 0)
+    force += column(5.0 * np.eye(1, STEPS, 60)[0], 0) + column(7.0 * np.eye(1, STEPS, 5)[0], 0)
+    states = np.column_stack([x, np.full((STEPS + 1, 2), (-0.05, 0.0))])
+    pushed = replace(trace(device=states, force=force), impact_step=np.array([30]))
+    assert unbalanced_force(pushed, slice(0, STEPS + 1)) == pytest.approx([5.0 / 79, 0.0, 0.0])
+    assert unbalanced_force(pushed, slice(0, 20)) == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_impacts_separate_in_their_own_step_only():
+    apart = column(np.where(np.arange(STEPS + 1) > 40, 3e-4, 0.0), 0)  # in step 40
+    parted = trace(tool=apart, device=np.zeros_like(apart))
+    assert separation_by_impacts(parted).max() == 0.0
+    assert separation_by_impacts(replace(parted, impact_step=np.array([10, 40])))[0] == pytest.approx(3e-4)
+
+
+def test_the_overlap_of_the_device_is_that_of_its_deepest_corner():
+    away, inside = (np.tile([x, -0.05, 0.0], (STEPS + 1, 1)) for x in (0.05, 0.0100))  # 0.5 mm in the right wall
+    assert device_overlap(trace(device=inside, tool=away)) == pytest.approx(5e-4)
+    assert device_overlap(trace(device=away)) == 0.0
 
 
 @pytest.mark.parametrize(("heights", "count"), [
