@@ -17,7 +17,7 @@ from reference.worlds import run_world
 from reports.commands.run import Values, scene_given
 from reports.figures.figure import draw, standalone
 from reports.figures.worlds import worlds as worlds_figure
-from reports.show import Answer, Json, sentence, stage_progress, table_text
+from reports.show import Answer, Json, sentence, stage_progress
 from reports.store.io import write_whole
 from verification.check import Topic
 from verification.complementarity.solvers import collections, own_problems
@@ -27,14 +27,6 @@ from verification.table import Table, titled
 from verification.worlds import compare_worlds
 
 FOLDER = Path("out/compare")
-# Columns of the comparison with complementarity that are printed; the file has all.
-_SHOWN = {
-    "map": ("impacts", "e", "redundant rows", "cases", "share that agrees", "largest distance",
-            "largest extra loss of KE⁻"),
-    "friction": ("e", "μ", "cases", "all contacts push", "share equal to the NCP", "unsolved", "NCP gains",
-                 "largest change of KE, IAPB"),
-    "convergence": ("scene", "events", "step", "error of positions", "order, positions", "order, velocities"),
-}  # fmt: skip
 
 
 def compare(
@@ -89,7 +81,7 @@ def compare(
                           checks=collections({**folders}), says=lambda tables, parts: "")  # fmt: skip
             topic = alone if only_problems else complementarity(folders)
             found = topic(run_world, "full" if full or only_problems else "quick", partial(progress, topic.title))
-            name, lines = topic.key, _problem_lines(found) if only_problems else _study_lines(found)
+            name, lines = topic.key, _problem_lines(found)
     place = out or FOLDER / f"{name}.json"
     lines += [sentence(part.sentence, "• ") for part in found.parts]
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in found.failures]
@@ -160,24 +152,6 @@ def _unsolved(problems: Table) -> Iterator[str]:
         residual = first["worst residual"]
         why = ": ".join(filter(None, [f"residual {residual:.1e}" if residual else "", first["note"]]))
         yield f"{solver} {outcome} {1 + len(others)}, such as {first['problem']}: {why.removeprefix('refused: ')}"
-
-
-def _study_lines(found: Finding) -> list[str | Table]:
-    lines: list[str | Table] = []
-    for name, keys in _SHOWN.items():
-        if name in found.tables:
-            lines += [sentence(found.tables[name].note) or name, found.tables[name].select(keys), ""]
-    if "time per impact" in found.tables:  # a row per kind and size, a column per solver
-        cells: dict[tuple[Any, ...], dict[str, str]] = {}
-        for row in found.tables["time per impact"].records():
-            time = None if row["median"] is None else f"{row['median']:.3g}"
-            said = " ".join(filter(None, [time, "" if row["outcome"] == "solved" else row["outcome"]]))
-            cells.setdefault((row["impacts"], row["contacts"]), {})[row["solver"]] = said
-        solvers = dict.fromkeys(found.tables["time per impact"].column("solver"))
-        by_solver = titled(("impacts", "contacts", *solvers),
-                           [(*key, *(cells[key].get(solver) for solver in solvers)) for key in sorted(cells)])
-        lines += ["Time per impact [µs], median", table_text(by_solver, keys=2), ""]
-    return lines + _problem_lines(found)
 
 
 def _problem_lines(found: Finding) -> list[str | Table]:

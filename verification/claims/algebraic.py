@@ -161,19 +161,15 @@ def losses(key: str, question: str, place: str, families: Sequence[Family], impa
                                                     for case in batch.impacts)),
         },
         exact=([family for family in families if family.condition_number == families[0].condition_number], (0.5,)),
-        roles={AS_PRINTED: MISPRINT}, draw=_halved, holds=_tells,
+        roles={AS_PRINTED: MISPRINT}, draw=_halved,
+        holds=lambda row: None if within_bound(row) and row["part"] in (WITH_HALF, AS_PRINTED) and (
+            0.5 * (1.0 - row["restitution"] ** 2) <= 10.0 * row["bound"]) else within_bound(row),
         says=f"With the engine's resolver, the relative energy gain is {{{PASSIVE}}}. {CAN_GAIN} In rational "
         f"arithmetic, the gain [J] is {{{EXACTLY_PASSIVE}}}. The last line of the paper's own derivation (32) loses a "
         f"factor ½, so the printed form ({place}) is twice the loss. With the factor ½, the difference between loss "
         f"and form, relative to the form, is {{{WITH_HALF}}}; as printed, it is {{{AS_PRINTED}}}. With the factor, in "
         f"rational arithmetic, it is {{{EXACT_LOSS}}}.",
     )  # fmt: skip
-
-
-def _tells(row: Row) -> bool | None:
-    """Return whether an error is within its bound; None if the form as printed and with ½ differ too little to tell."""
-    held, difference = within_bound(row), 0.5 * (1.0 - row["restitution"] ** 2)
-    return None if held and row["part"] in (WITH_HALF, AS_PRINTED) and difference <= 10.0 * row["bound"] else held
 
 
 def _halved(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:

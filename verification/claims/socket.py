@@ -71,10 +71,10 @@ def _row(study: Study, case: Socket) -> Row:
 
 
 def _found(study: Study, case: Socket) -> dict[str, Any]:
-    distances = {"cluster_distance": 1e-3 * case.cluster,
-                 "coherence_distance": case.coherence * LARGEST_SPEED / case.rate}
+    contact = {"damping": case.damping, "cluster_distance": 1e-3 * case.cluster,
+               "coherence_distance": case.coherence * LARGEST_SPEED / case.rate}  # fmt: skip
     return study.once(("socket", case), lambda: count_false(
-        study.run(socket(distances | {"damping": case.damping}, case.rate, case.facets), "IAPB", "full")))
+        study.run(socket(contact, case.rate, case.facets), "IAPB", "full")))
 
 
 def _says(table: Table) -> str:

@@ -73,7 +73,6 @@ SIZES = (*range(1, 13), 16, 24, 32, 48, 64, 96, 128, 300)
 # arrays of its own. Their median then moves by up to 12 % between processes on a busy machine (once by 19 %).
 DRAWS, ROUNDS, CLEAR = 4, {"quick": 2, "full": 4}, 1.1
 FRESH, REPEATED = 12, 2  # number of sizes inside a region, and of fresh trials of each size
-SHOWN = (1, 6, 16, 64, 300)  # contacts whose ratios the sentence gives
 TIMES = ("decades", "ratio", "lower quartile", "upper quartile")
 SAME_VELOCITY = 1e-5  # largest difference of an answer from daqp's, relative to |v⁻|
 
@@ -124,7 +123,7 @@ def _ratio_says(table: Table) -> str:
     for part in dict.fromkeys(table.column("problem")):
         rows = table.where(problem=part)
         shown = {row["contacts"]: f"{row['ratio']:.2g}" for row in rows.records()
-                 if row["ratio"] is not None and row["contacts"] in SHOWN}  # fmt: skip
+                 if row["ratio"] is not None and row["contacts"] in (1, 6, 16, 64, 300)}  # fmt: skip
         above, below = (f"with {min(found)} to {max(found)} contacts ({len(found)} sizes)" if found else "at no size"
                         for found in (rows.that(outcome).column("contacts") for outcome in (True, False)))
         texts.append(f"For {part} it is {', '.join(shown.values())} with {', '.join(map(str, shown))} contacts. It is "
