@@ -241,18 +241,20 @@ ERRORS = Check(
     key="errors", question="Does the engine give the known outcome?",
     cases=lambda study: product(SIMULATORS, FIXED_SCENES), row=_rows, says=_says, digits=2,
     note="The errors of energy, momentum and velocity are relative to the kinetic energy at the start, the sum of m "
-    "|v| and the largest speed. In resting scenes the rise of energy is relative to m g times the bodies' size. The "
-    "law is met if all errors are at most 1 % or, in resting scenes, if nothing moves by more than 1 mm.",
+    "|v| and the largest speed. In resting scenes the rise of energy is relative to m g times the bodies' size. "
+    "The outcome is right (“met”) if all errors are at most 1 % or, at rest, if nothing moves by more than 1 mm.",
 )
 engines = Topic(
     key="engines", title="Other engines",
-    question="Every installed engine simulates eight frictionless scenes of known outcome: either symmetry and the "
-    "conservation of energy and momentum determine it, or nothing may move. Each scene runs twice: with the settings "
-    "that suit the engine best, and with a time step of 1 ms. The settings of other engines are those with the "
+    question="Every installed engine simulates eight frictionless scenes of known outcome (listed below): symmetry and "
+    "conservation of energy and momentum determine it, or nothing may move. Each scene runs twice: with the engine's "
+    "best settings (“own”), and with its best settings at a step of 1 ms (“matched”). The best are those with the "
     "smallest error on a grid of settings (docs/engines.md). Our own engine and our ideal world run with their "
     "defaults. One program computes energy, momentum and overlap from the positions and velocities of all engines. "
     "MuJoCo and Drake have no coefficient of restitution; springs with suitable damping replace it.",
     checks=(ERRORS, Check(key="settings", question="With which settings did the engines run?",
-                          cases=lambda study: SIMULATORS, row=_settings)),
+                          cases=lambda study: SIMULATORS, row=_settings),
+            Check(key="scenes", question="What must come out?", cases=lambda study: FIXED_SCENES,
+                  row=lambda study, name: {"scene": name.replace("_", " "), "outcome": fixed_scene(name).law})),
     says=_answer,
 )

@@ -11,7 +11,7 @@ from reference.simulators.scene import UPRIGHT, Cuboid, FixedScene, Quaternion, 
 from reference.simulators.simulator import Settings, Simulator, damping_for
 from reference.simulators.trajectory import Samples, Trajectory, steps_between_samples
 
-NO_RESTITUTION = "no coefficient e: a spring and damper per contact, stiff enough to part impacts, stand in for it"
+NO_RESTITUTION = "no e: a spring and damper per contact, so stiff that impacts do not overlap, replaces it"
 OWN_STEP, STACK_STEP, DEFAULT_STEP = 1e-5, 2e-5, 2e-3  # [s] for bouncing, for the stack, and the engine's default
 # A spring's half period in steps. With fewer, the step adds or removes energy; with more, impacts overlap in time.
 OWN_STEPS_OF_AN_IMPACT = 100.0

@@ -48,7 +48,7 @@ class Siconos(Simulator):
                      "obstacles": obstacles, "stride": steps_between_samples(step), "gravity": scene.gravity,
                      "restitution": scene.restitution}, longest=None)  # fmt: skip
         if found["residual"] > CONVERGED:
-            raise IapbError(f"Siconos' solver left a residual of {found['residual']:.1e}")
+            raise IapbError(f"Siconos' solver stopped with a residual of {found['residual']:.1g}")
         record = Samples()
         for time, states in found["samples"]:
             q, twist = (np.array(part, np.float64) for part in zip(*states, strict=True))

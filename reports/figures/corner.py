@@ -130,7 +130,7 @@ def _first_shown(runs: Mapping[str, Run]) -> int:
 
 
 def _trajectories(key: str, runs: Mapping[str, Run], traces: Traces) -> list[Panel]:
-    """Draw the path and, from where the curves part, the three coordinates and the distances from ideal.
+    """Draw the path and, from where the curves differ, the three coordinates and the distances from ideal.
 
     If a device is limited, also draw how far tool and device come apart, and the penetration.
     """
@@ -143,7 +143,7 @@ def _trajectories(key: str, runs: Mapping[str, Run], traces: Traces) -> list[Pan
                     "path of the hand, from just before contact")]  # fmt: skip
     for k, (name, unit, factor) in enumerate(_COORDINATES):
         values = {curve: factor * trace.device[:, k] for curve, trace in traces.items()}
-        panels.append(over("xyz"[k], values, f"{name} [{unit}]", f"{name}, from where the curves part"))
+        panels.append(over("xyz"[k], values, f"{name} [{unit}]", f"{name}, from where they differ"))
     if "ideal" in traces:
         off = {curve: trace.device - traces["ideal"].device for curve, trace in traces.items() if curve != "ideal"}
         panels += [over("off-position", {curve: MILLI * np.hypot(*path[:, :2].T) for curve, path in off.items()},

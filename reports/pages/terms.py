@@ -64,8 +64,8 @@ TERMS: dict[str, tuple[str, str]] = {
     r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, evaluated with "
                                                    "numpy as it is printed"),
     r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "
-                                            "impact: pseudo-inverse of J M⁻¹ Jᵀ, its Cholesky factor, the same with a "
-                                            "small term added to its diagonal, and singular values of J"),
+                                            "impact: the printed formula, the Cholesky factor of W, the inverse of W "
+                                            "plus a small diagonal matrix, and the singular values of J"),
     r"anytime|stop(?:s|ped) early": ("stopped early", "the impact ends when its budget of rows or time is used up, "
                                      "with the rows resolved so far"),
     r"(?:Newton )?LCPs?|complementarity": ("LCP", "linear complementarity problem: impulses only push (p ≥ 0). A "
@@ -73,7 +73,7 @@ TERMS: dict[str, tuple[str, str]] = {
                                            "says; a contact without one may separate faster"),
     r"NCP|CCP": ("NCP, CCP", "complementarity problems with Coulomb's friction cone: the law itself, and its convex "
                  "relaxation"),
-    r"Delassus": ("Delassus matrix", "J M⁻¹ Jᵀ, the inverse mass that the contacts feel"),
+    r"Delassus|W": ("Delassus matrix W", "J M⁻¹ Jᵀ, the inverse mass that the contacts feel"),
     r"trials?": ("trial", "one tested condition of a claim: the claim holds there, fails, or cannot be told "
                   "(the values differ by less than their error)"),
     r"coherence|clustering": ("coherence, clustering", "the paper's two filters. Coherence: a contact near a contact "

@@ -374,7 +374,7 @@ def _budgets_say(table: Table) -> Part:
     gains = sum(row["largest relative gain"] > 0.0 for row in rows)
     half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
     return target(
-        "An impact that stops early, after a budget of rows (computed exactly)",
+        "An impact that stops early, after a budget of rows (energy computed exactly)",
         f"adds energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows already take "
         f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "never adds energy",
         gains == 0, timed=False)  # fmt: skip
@@ -383,5 +383,5 @@ def _budgets_say(table: Table) -> Part:
 BUDGET_ROWS = Check(
     key="budgets", question="What does an impact give that stops early?", row=stopped, says=_budgets_say, digits=3,
     cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
-    note="Residual: max |J v⁺ + e J v⁻| in the kinetic metric, relative to |v⁻|.",
+    note="Residual: max |Jᵢ v⁺ + e Jᵢ v⁻| / √(Jᵢ M⁻¹ Jᵢᵀ), relative to |v⁻| in the kinetic metric.",
 )  # fmt: skip

@@ -93,14 +93,14 @@ def fitted(table: Table, method: str, axis: str) -> Row:
 def _growth_says(table: Table) -> Part:
     [ours] = table.where(method=FACTORED, axis="contacts").records()
     return limited("the time of the factored impact grows as the number of contacts to the power", ours["exponent"],
-                   LARGEST_EXPONENT, "", " (steepest from {steepest from:g} to {to:g}: {there:.2f})".format_map(ours))
+                   LARGEST_EXPONENT, "", " over all sizes ({steepest from:g} to {to:g}: {there:.2f})".format_map(ours))
 
 
 SCALING = Check(
     key="scaling", question="How does the time of an impact grow with its size?", cases=lambda _: (SIZES,),
     row=scaling, says=_scaling_says, timed=TIMES, digits=3,
-    note="Random impacts; the rank of the rows is two thirds of the number d of coordinates. The nine hard impacts of "
-    "a size (page Accuracy against time) have other ranks, and other times.",
+    note="Random impacts; the rank of the rows is two thirds of the number d of coordinates. The page Accuracy against "
+    "time has other impacts, so its times differ.",
 )  # fmt: skip
 FITTED = Check(
     key="fitted", question="With which power does it grow?", says=_growth_says, digits=3,

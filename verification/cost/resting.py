@@ -56,7 +56,7 @@ class RestingScene(NamedTuple):
 
 RESTING = {
     "peg in the corner": RestingScene("peg_at_rest.yaml", 2000, {
-        "box": FOLDER / "peg_as_box.xml", "four corner balls": FOLDER / "peg_as_balls.xml",
+        "box": FOLDER / "peg_as_box.xml", "a ball at each corner": FOLDER / "peg_as_balls.xml",
     }, (-0.32, 0.4, 0.0, 0.0, 0.0, 0.0)),
     "free box on a plane": RestingScene("box_at_rest.yaml", 2000, {"box": FOLDER / "box.xml"}, (0.0,) * 6),
     "seven-axis arm on a block": RestingScene(

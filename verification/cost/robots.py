@@ -63,11 +63,11 @@ def _robots_say(table: Table) -> Iterator[Part]:
         worst = max(rows, key=lambda row: float(row["ratio"]))
         yield limited(f"the {worst['quantity']} of {worst['robot']}, {form}, takes", worst["ratio"], limit,
                       " times as long as Pinocchio's",
-                      f", the largest ratio of {len({row['robot'] for row in rows})} robots ({table.note})")
+                      f", the largest ratio of {len({row['robot'] for row in rows})} {table.note}")
 
 
 ROBOTS = Check(
     key="robots", question="How long do M and B take, compared with Pinocchio?", cases=lambda _: FILES, row=time_robot,
     says=_robots_say, timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"), digits=3,
-    note="robots of other projects" if OTHERS else "the project's own robots",
+    note="robots of other projects" if OTHERS else "robots of this project",
 )  # fmt: skip

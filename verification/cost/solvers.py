@@ -105,14 +105,15 @@ def solvers_say(table: Table) -> Part:
 
 def faster(how: str, rival: str, what: str, outcomes: Sequence[bool | None], where: str) -> Part:
     """Say in how many cases IAPB is faster than a rival, and where it is slower; None is a difference within noise."""
-    count, slower = sum(more is not None for more in outcomes), outcomes.count(False)
+    more, slower = outcomes.count(None), outcomes.count(False)
+    count = len(outcomes) - more
     if not count:
         return Part(f"Time of one impact {how}: nothing was timed that differs clearly from IAPB.", NOT_COMPUTED,
                     timed=True)
     return target(
         f"Time of one impact, from M, J and v to v⁺ at the same accuracy; both methods {how}",
-        f"IAPB is faster than {rival} in {count - slower} of the {count} {what} whose times differ clearly (in "
-        f"{len(outcomes) - count} more they do not){where and f'. IAPB is slower {where}'}", "faster in all",
+        f"IAPB is faster than {rival} in {count - slower} of the {count} {what} whose times differ clearly "
+        f"{f' (in {more} more they do not)' * bool(more)}{where and f'. IAPB is slower {where}'}", "faster in all",
         not slower, f"with both methods {how}, IAPB is slower than {rival} in {slower} of {count} {what}")
 
 
@@ -121,6 +122,6 @@ MEASURED = ("median [µs]", "least [µs]", "largest [µs]")
 IMPACT_TIMES = Check(
     key="time per impact", question="", row=time_impact, timed=(*MEASURED, "note"), digits=3,
     cases=lambda _: [Size(family, contacts) for contacts in CONTACTS for family in FAMILIES],
-    note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. Kernels are called from compiled code. "
-    "All other methods are called from Python, with their checks; our adapter of the solvers also forms W.",
+    note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. The two kernels are called "
+    "from compiled code, all others from Python with their checks. The time of a solver includes forming W.",
 )  # fmt: skip

@@ -154,9 +154,10 @@ RACES = Check(
     key="steps against MuJoCo", question="How long is a step, compared with MuJoCo's?", row=race, says=_races_say,
     cases=lambda _: RESTING if find_spec("mujoco") else (), digits=3,
     timed=("MuJoCo's step", "ratio", "quartiles", "iapb's drift", "MuJoCo's drift"),
-    note="Frictionless (condim 1), with the same masses, forces and step; MuJoCo's other options have default values. "
-    "The engine records its steps; MuJoCo does not. Each round of timing gives a ratio; the table has their median and "
-    "quartiles. Contacts are means over the timed steps. Drift: largest change of a coordinate while timed, m or rad.",
+    note="Frictionless (condim 1), with the same masses, forces and step; MuJoCo with each of its solvers, and default "
+    "values else. The findings name its fastest solver. The engine records its steps; MuJoCo does not. Ratio: "
+    "median over the rounds. Contacts: means over the timed steps. Drift: largest change of a coordinate while timed, "
+    "m or rad.",
 )  # fmt: skip
 
 

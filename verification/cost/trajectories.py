@@ -104,7 +104,7 @@ OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float, float]]
 
 
-BELOW = "below the truth's bound"
+BELOW = "below the truth's error bound"
 Record = dict[str, Any]
 ERRORS = ("position", "energy", "signed energy", "energy made")
 
@@ -299,7 +299,7 @@ def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[flo
     for step in sorted(steps, reverse=True):
         seconds = per_step * scene.duration / step
         run: Record = {"step [ms]": 1e3 * step, "time [ms/s]": None, **dict.fromkeys(ERRORS), "outcome": TIMED_OUT,
-                       "note": f"would take {seconds:.2g} s"}  # fmt: skip
+                       "note": f"would take {seconds:.3g} s; limit: {longest:g} s"}  # fmt: skip
         if seconds <= longest:
             found, seconds = timed(partial(_tried, way, scene, step))
             if isinstance(found, Exception):
@@ -433,8 +433,8 @@ def _motions_say(motions: Table) -> Iterator[Part]:
         text = ", ".join(f"{name} {_error(run)} ({run['time']:.3g} ms)"
                          for name, run in best.items())
         more = f"; IAPB reaches MuJoCo's smallest error in {as_good:.3g} ms" if as_good < inf else ""
-        yield target(f"Whole motion ({scene}): smallest position error in body lengths, with the computing time per "
-                     "simulated second", f"{text}{more}",
+        yield target(f"Whole motion ({scene}): smallest position error of all time steps, in body lengths, with the "
+                     "computing time per simulated second", f"{text}{more}",
                      "no method is more exact, and MuJoCo's error is reached in less time", exact and fast,
                      f"in the whole motion “{scene}” " + (
                          "another method is as exact in less time" if exact else
@@ -448,16 +448,16 @@ def _error(run: Row) -> str:
 MOTIONS = Check(
     key="motions", question="What does the accuracy of a whole motion cost?", cases=lambda _: TRAJECTORY_SCENES,
     row=motions_of, says=_motions_say, timed=("time", "outcome", "note"), digits=3,
-    note="Errors of position are in the sup norm over samples a millisecond apart, relative to the body's length. "
-    "Errors of energy are relative to the largest kinetic energy.",
+    note="The truth is an event-driven solution. Errors of position: the largest at instants a millisecond apart, "
+    "relative to the body's length. Of energy: relative to the largest kinetic energy. Below its bound: the bound.",
 )  # fmt: skip
 WORTH = Check(
     key="worth", question="Which method is worth its time?", row=lambda _, row: row, digits=2,
     cases=lambda study: worth(study.table(MOTIONS), WORLDS).by_title(), timed=(
         "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
-    note="Errors are those of position; the least error is the median over the scenes. A cost is fitted to runs along "
-    f"which the error falls by a factor of {GAINED:g} or more from one run to the next. A fit needs at least "
+    note="Errors are those of position; “least error” is the median over the scenes of their least errors. A cost is "
+    f"fitted to runs along which the error falls by {GAINED:g} times or more from run to run. A fit needs at least "
     f"{FIT_RUNS} runs and a total fall of {FIT_FALL:g} times, and is never extrapolated. Best for its time: number of "
     f"scenes in which no other run is both faster and more exact, among errors up to {USEFUL:g} lengths. Energy made: "
     "the largest excess of the energy over its value at the start.",

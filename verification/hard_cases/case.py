@@ -68,7 +68,7 @@ class HardCase:
     exact_jacobian: Exact | None = field(default=None)
     well_posed: bool = True
     methods: tuple[str, ...] | None = None
-    law: ClassVar[str] = "(21), or Poisson's law where restitution differs, in exact rational arithmetic"
+    law: ClassVar[str] = "(21), or for unequal e Poisson's law (rebound = e times compression's impulse), in fractions"
 
     @property
     def meant_jacobian(self) -> Exact:
@@ -104,7 +104,7 @@ class FrictionalCase(HardCase):
 
     tangent: Floats = field(kw_only=True)
     friction: float = field(kw_only=True)
-    law = "Newton's law with Coulomb friction, reduced until no energy is gained; rational and ball arithmetic"
+    law = "Newton's law with Coulomb friction, reduced until no energy is gained; fractions and ball arithmetic"
 
     @property
     def all_rows(self) -> Exact:

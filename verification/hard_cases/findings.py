@@ -27,15 +27,15 @@ ENGINE = ("factored", "IAPB")  # the engine's default impact method and its worl
 _NOTES = {
     "impact": "Stable: gain at most 10 d ε √κ(M), restitution residual at most 1e-8, error at most the error allowed. "
               "The gain (KE⁺ − KE⁻)/KE⁻ is computed exactly. The error is |v⁺ − truth| / |v⁻| in the kinetic metric; "
-              "allowed is 10 n ε √κ (√κ + κ(A)), n = max(c, d), with κ of M scaled to a unit diagonal. Smallest fault "
-              "seen: the smallest relative error that makes the verdict unstable when planted in the impulse or "
-              "velocity. Time: median of a call.",
+              "allowed is 10 n ε √κ (√κ + κ(A)), n the larger of c rows and d coordinates, κ that of M scaled to a "
+              "unit diagonal, A = J L⁻ᵀ with M = L Lᵀ. Smallest fault seen: the smallest relative error that, planted "
+              "in the impulse or velocity, makes a stable answer fail. Time: median of a call.",
     "motion": "Stable: no energy created, restitution residual at most 1e-8, error within the discretisation error of "
-              "the step. Gain: the largest amount of energy created, relative to the energy at the start or the work "
-              "done on the scene. Error: distance from the exact law, relative to its answer. Restitution residual: "
-              "that of the collisions, weighted by their impulses. Smallest fault seen: the smallest share by which "
-              "all displacements and changes of velocity must be altered to make the verdict unstable. Time: median of "
-              "a step.",
+              "the step. Gain: the largest amount of energy created, relative to the kinetic energy at the start plus "
+              "the work of hand and gravity. Error: distance from the exact law, relative to its answer. Restitution "
+              "residual: that of the collisions, weighted by their impulses. Smallest fault seen: the smallest share "
+              "by which changes of place and velocity must be altered to make a stable motion fail. Time: median of a "
+              "step.",
 }  # fmt: skip
 
 

@@ -174,10 +174,10 @@ def painleve_rod() -> TrajectoryCase:
     return TrajectoryCase(
         "Painlevé's rod: sliding without a finite answer",
         "Painlevé (1895); Génot and Brogliato (1999); Stewart (2000)",
-        "the effective inertia of the sliding contact is negative: rigid bodies have no acceleration, spring forces "
-        "diverge",
+        "the effective inertia of the sliding contact is negative: no acceleration of rigid bodies satisfies the laws, "
+        "and with springs the force grows without bound",
         "it jams: with a rigid contact at once, with a spring as soon as the force is large enough",
-        f"springs: the rod slips by its own equations and stops after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
+        f"with springs the slip, by the equations of motion, stops after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
         on_floor("painleve_rod", "Painlevé's rod", [_ROD], _ON_END, source="Painlevé (1895)", rate=4000, duration=0.1),
         _measure_rod, _WORLDS,
     )  # fmt: skip

@@ -367,5 +367,5 @@ def serve() -> None:
         except MemoryError:
             found = OutOfMemory(f"needs more than {most_bytes / 2**30:g} GiB")
         except IapbError as error:
-            found = IapbError(str(error))
+            found = error
     sys.stdout.buffer.write(pickle.dumps(found))

@@ -121,7 +121,7 @@ def wedged_peg_motion() -> TrajectoryCase:
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
         "six gaps close in the same step; then the springs of six contacts carry the hand force",
         "at rest at the end of the hole, no deeper than six springs allow",
-        "statics: 2 K δ + 4 K s² δ = F, s the sine of the draft; a rigid wall has δ = 0",
+        "statics: 2 K δ + 4 K s² δ = F, with depth δ, hand force F and s the sine of the sides' angle; rigid: δ = 0",
         load_scene(find_scene("peg_hole")), _measure_peg,
     )  # fmt: skip
 
@@ -166,7 +166,7 @@ def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
 
     return TrajectoryCase(
         f"Newton's cradle, {words}", "textbook; paper (12) for the rows",
-        "the outcome depends on which contacts collide: impulses or springs transmit the momentum",
+        "new contacts transmit momentum by impulses, lasting ones by springs; rounding may decide which are new",
         "momentum is conserved and no energy created, whichever ball leaves",
         "momentum and energy of five equal elastic balls: Σ v = 1 and Σ v² = 1",
         scene, measure,

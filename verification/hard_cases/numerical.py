@@ -39,8 +39,8 @@ def printed_formula_gains() -> HardCase:
     rows = np.vstack([base, base + 1e-4 * rng.normal(size=(2, d)), base + 1e-4 * rng.normal(size=(2, d))])
     return HardCase(
         "Rows 1e-4 apart on κ(M) = 1e6, elastic",
-        "erratum 6 of the paper; normal equations: Higham, Accuracy and Stability (2002)",
-        "W has condition 1e8 from the rows and 1e6 from M: its small singular values are noise",
+        "erratum 6 (docs/theory.md); normal equations: Higham, Accuracy and Stability (2002)",
+        "κ(W) is 1e8 from the rows times 1e6 from M: its small singular values are noise",
         "no energy is gained; the printed formula inverts noise",
         mass, rows, rng.normal(size=d), 1.0,
     )  # fmt: skip
@@ -60,7 +60,7 @@ def hilbert_rows() -> HardCase:
     return HardCase(
         "Hilbert rows, n = 8", "Hilbert (1894); the classical rank decision",
         "the exact rank is full, the condition number 1.5e10: singular values lie on both sides of any tolerance",
-        "restitution is met and no energy is gained; how many of the smallest directions count is a choice",
+        "restitution is met and no energy is gained; a method may keep any number of small singular values",
         np.eye(n), rows, np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]), 0.5, well_posed=False,
     )  # fmt: skip
 

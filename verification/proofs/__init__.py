@@ -76,9 +76,10 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
         asked = [one for one in development if one.holds is not None]
         lost = [one for one in development if one.coq == NO_ANSWER]
         accepted = sum(one.holds is True for one in asked)
-        told = (f"Coq proves {accepted} of {len(development)} theorems about the exact checker and the floating-point "
-                "arithmetic of the resolver's last step. Their only axioms are those of the real numbers and, through "
-                f"Flocq, classical logic. {ARGUED}" if asked or lost else
+        told = (f"Coq proves {sum(one.coq == YES for one in records)} of the statements too, and {accepted} of "
+                f"{len(development)} theorems about code: a checker of impacts in exact integers, and the last step of "
+                "the engine's impact in floating point. The axioms are those of the real numbers; Flocq, Coq's library "
+                f"of floating point, also assumes classical logic. {ARGUED}" if asked or lost else
                 f"Coq is not installed: {len(development)} theorems about the code were not checked here.")  # fmt: skip
         if lost:
             told = f"{told} Of {len(lost)} theorems Coq did not compile the file: {lost[0].error}"

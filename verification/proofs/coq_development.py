@@ -31,8 +31,8 @@ KNOWN_AXIOMS = frozenset({
 STATEMENTS = "Theorems"  # the file with theorems that are also statements of the kernel, by the same names
 NOT_RUN, NO_ANSWER = "not run here", "no answer"
 # Text for the report beside the theorems: the rest of the proof that an accepted candidate never gains energy.
-ARGUED = ("Not proved in Coq: that the compiled kernel does the operations that the theorems state, in this order, and "
-          "that frexp and ldexp are exact.")
+ARGUED = ("Not proved in Coq: that the compiled code does the theorems' operations in their order, and that the C "
+          "functions frexp and ldexp, which scale by powers of two, are exact.")
 _HINT = "apt-get install coq libcoq-flocq ocaml-nox (Debian)"
 
 

@@ -72,7 +72,7 @@ def _needed(entry: Entry, dropped: list[Fact], statement: Statement) -> Refutati
     others = [fact for fact in statement.given if fact not in dropped]
     false = [fact for fact in statement.conclusions if not holds(fact, case)]
     refuted = bool(entry.case and false) and all_hold(others, case) and not all_hold(dropped, case)
-    title = "without " + " and ".join(f"'{fact.name}'" for fact in dropped)
+    title = "false without " + " and ".join(f"'{fact.name}'" for fact in dropped)
     return Refutation(title, fact_line([*false, *statement.conclusions][0]), case_lines(case, statement.names),
                       entry.note, refuted)  # fmt: skip
 

@@ -31,7 +31,7 @@ CORRUPTED = [
     ("theorem_2", "given   G is a {1}-inverse", DROPPED),
     ("impulse_of_independent_rows", "p = −(1 + e) W⁻¹ J v", "p = (1 + e) W⁻¹ J v"),
     ("newton_law_solvable", "G b + (I − G W) p", "G b + (I + G W) p"),
-    ("independent_subset", "given   R chooses them", DROPPED),
+    ("independent_subset", "given   R picks the chosen rows", DROPPED),
     ("step_37", "X W X = X\n", "X W X = 2 X\n"),
     ("reverse_order_law", "given   Penrose 3", DROPPED),
     ("delassus_definite", "given   the rows are independent", DROPPED),
