@@ -100,7 +100,7 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
             for device, each in ratios.items() if each]  # fmt: skip
     if said:
         yield all(median(each) > 1.0 for each in ratios.values() if each), (
-            f"Compared with springs alone, the largest force on the hand is with impulses {', and '.join(said)}.")
+            f"With impulses instead of springs alone, the largest force on the hand is {', and '.join(said)}.")
 
 
 def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
