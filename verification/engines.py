@@ -215,10 +215,12 @@ def _is_ours(row: Row) -> bool:
 
 
 def _misses(rows: Iterable[Row]) -> str:
-    """The misses in words."""
-    settings = {True: "with its own settings", False: "at a step of 1 ms"}
-    return ", ".join(f"{row['scene']} {_worst(row)} {settings[row['settings'] == OWN]}"
-                     for row in rows if row["law"] != MET)  # fmt: skip
+    """The misses in words, each with its settings."""
+    found: dict[str, list[str]] = {}
+    for row in (row for row in rows if row["law"] != MET):
+        found.setdefault(f"{row['scene']} ({_worst(row)})", []).append(
+            "with its own settings" if row["settings"] == OWN else f"at a step of {1e3 * MATCHED_STEP:g} ms")
+    return ", ".join(f"{what} {' and '.join(how)}" for what, how in found.items())
 
 
 def _met(rows: Sequence[Row]) -> int:
@@ -228,12 +230,12 @@ def _met(rows: Sequence[Row]) -> int:
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     present = sorted(_present(tables["errors"]), key=lambda row: (not _is_ours(row), row["engine"]))
     own, matched = ([row for row in present if row["settings"] == choice] for choice in SETTINGS)
-    said = "; in ".join(f"{engine}: {missed}" for engine, rows in groupby(present, key=lambda row: row["engine"])
+    said = "; ".join(f"{engine}, {missed}" for engine, rows in groupby(present, key=lambda row: row["engine"])
                         if (missed := _misses(rows)))  # fmt: skip
     return (
         f"{len({row['engine'] for row in present})} engines simulate {len({row['scene'] for row in present})} scenes "
         f"of known outcome. The outcome is right in {_met(own)} of {len(own)} runs with the engine's own settings and "
-        f"in {_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Wrong in {said}." if said else "")
+        f"in {_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Wrong: {said}." if said else "")
     )
 
 

@@ -78,17 +78,17 @@ _COUNTS = (5, 10, 20, 50, 100, 200)  # ticks
 
 @recipe("where-to-stop", "complementarity/piles")
 def where_to_stop(numbers: Table) -> Drawn:
-    """Draw over the contacts how often (19) is right, and how many of its impulses pull."""
+    """Draw over the contacts how often (21) is right, and how many of its impulses pull."""
     rows = numbers.records()
-    looks = looks_of(f"(19) for {given} contacts" for given in numbers.column("rows"))
+    looks = looks_of(f"(21) for {given} contacts" for given in numbers.column("rows"))
     limit = max(row["most contacts that agree"] for row in rows)
     wrong = min((row["contacts"] for row in rows if row["share that agrees"] < 1.0), default=limit + 1)
     prices = [row["time of pushing"] / row["time of (21)"] for row in rows]
     panels = list[Panel]()
     for key, alt, label, axis in (
         ("share that agrees", f"No pile of more than {limit} contacts agrees.",
-         "how often (19) agrees with complementarity", "piles that agree [%]"),
-        ("share of impulses that pull", "Share of impulses that pull over contacts.", "impulses of (19) that pull",
+         "how often (21) agrees with complementarity", "piles that agree [%]"),
+        ("share of impulses that pull", "Share of impulses that pull over contacts.", "impulses of (21) that pull",
          "impulses that pull [%]"),
     ):  # fmt: skip
         with Plot(f"where-to-stop-{key.split()[-1]}") as plot:

@@ -139,7 +139,7 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
         "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: with impulses (IAPB) the "
         "hand's path is nearest to the path at a rigid wall (ideal). A cross: springs only (PB) or a rigid wall felt "
         "through a spring (CBuc) is nearer. A ring: too close to tell, because the distances differ by less than the "
-        f"error of the ideal path. IAPB is closest in {', '.join(counts)}."
+        f"error of the ideal path. Of these starts, a part of those of C10, IAPB is closest in {', '.join(counts)}."
     )
     return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
                          "part", words=NAMED)
@@ -182,11 +182,11 @@ def counted(part: Part) -> str:
     if not part.decided and not part.unknown:
         return ""
     unknown = f", {part.unknown} cannot tell" if part.unknown else ""
-    cases = f" ({part.cases} cases in all)" if part.cases else ""
+    cases = f" ({part.cases} cases in these trials)" if part.cases else ""
     region = part.region
-    share = f" covers {region.share:.0%} of them" if region and region.share else ""
-    where = (f" over all conditions; the stated range{share}: {region.searched} trials led "
-             f"to it, {region.others + region.fresh} others confirm it") if region else ""  # fmt: skip
+    share = f" ({region.share:.0%} of the tested range)" if region and region.share else ""
+    where = (f" over all conditions; where stated{share}, {region.searched} of these led to the range, "
+             f"{region.others + region.fresh} other or new ones confirm it") if region else ""  # fmt: skip
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 

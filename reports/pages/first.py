@@ -14,12 +14,13 @@ from reports.pages.quantities import peg_step
 from reports.pages.records import Evidence
 from verification.claims.conditions import Condition
 from verification.claims.peg import LARGE, closest_in, small_tilts
+from verification.cost.steps import hardest
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
     "The energy loss in equations (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. "
-    "Impulses by (13) and (14) do not conserve momentum. Formula (21), computed as printed, can gain energy by "
-    "rounding."
+    "Impulses by (13) and (14) do not conserve momentum. The impulse (20), which gives the velocity (21), can add "
+    "energy by rounding if it is computed as printed."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
@@ -117,17 +118,17 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
         each = " and ".join(f"{name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
             f"If the pushed body, a peg, starts tilted by at most {degrees(Condition().tilt):.2f}°, impulses bring the "
-            f"hand's path nearer to the path at a rigid wall than springs alone and than a rigid wall felt through a "
-            f"spring: {each} starts that can tell.")
+            f"hand's path nearest to the path at a rigid wall: {each} starts in which the methods differ clearly.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
     """Yield the time of a step against the budget of a loop and against MuJoCo, and where Lemke's method is faster."""
     if step := peg_step(evidence):
-        yield f"One step of the corner scene takes {step}; a loop at 1 kHz allows 1000 µs."
+        yield f"A step of the peg that moves into the corner takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
-        least, most = (f"{end(races['ratio']):.2g}" for end in (min, max))
-        yield f"With all bodies at rest, a step takes {least} to {most} times as long as one of the engine MuJoCo."
+        ratios = sorted(float(row["ratio"]) for row in hardest(races))
+        yield (f"In {len(ratios)} scenes at rest, a step takes {ratios[0]:.2g} to {ratios[-1]:.2g} times as long as "
+               "one of the engine MuJoCo.")
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
         yield (f"Lemke's complementarity method is faster than our engine in {raced.holds.count(False)} of the "
                f"{len(raced.decided)} tested impacts whose times differ clearly.")
@@ -138,7 +139,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lines = []
     for topic in sorted(topics, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
         if clauses := [part.miss for part in topic.parts if part.miss]:
-            more = f" (further failures on that page: {len(clauses) - 1})" if len(clauses) > 1 else ""
+            more = f"; {len(clauses) - 1} more on the page {topic.title}" if len(clauses) > 1 else ""
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."

@@ -56,13 +56,14 @@ TERMS: dict[str, tuple[str, str]] = {
                                   "KE the kinetic energy, γ the normal velocities at the contacts"),
     r"κ": ("κ", "the condition number of a matrix: how much it amplifies relative errors"),
     r"ε": ("ε", "the relative spacing of doubles, 2⁻⁵² = 2.2e-16"),
-    r"passiv\w+": ("passive", "gives no energy to whoever holds it: the stored energy never exceeds what was put in"),
+    r"passiv\w+": ("passive", "adds no energy. Impact: the kinetic energy does not rise. Motion: the stored energy "
+                     "never exceeds that at the start plus the work done on it"),
     r"factored": ("factored", "the engine's method for one impact: it factors M and projects the velocity with an "
                   "orthonormal basis of the rows"),
     r"no clamp": ("clamp", "the last operation of an impact, which corrects the velocity by a few units in the last "
                   "place so that rounding cannot add energy"),
-    r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, evaluated with "
-                                                   "numpy as it is printed"),
+    r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, the velocity "
+                                                   "by the impulse (20), in numpy"),
     r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "
                                             "impact: the printed formula, the Cholesky factor of W, the inverse of W "
                                             "plus a small diagonal matrix, and the singular values of J"),
@@ -76,8 +77,12 @@ TERMS: dict[str, tuple[str, str]] = {
     r"Delassus|W": ("Delassus matrix W", "J M⁻¹ Jᵀ, the inverse mass that the contacts feel"),
     r"trials?": ("trial", "one tested condition of a claim: the claim holds there, fails, or cannot be told "
                   "(the values differ by less than their error)"),
-    r"coherence|clustering": ("coherence, clustering", "the paper's two filters. Coherence: a contact near a contact "
-                              "of the previous step is not new. Clustering: contacts near each other become one"),
+    r"coherence|clustering": ("coherence, clustering", "the paper's two filters. Coherence: a contact that moved less "
+                              "than the coherence distance in a step is old. Clustering: near contacts merge"),
+    r"[Ss]aturat\w+": ("saturated, scaled, spread", "impulses beyond the device's limits: each component cut at "
+                      "its limit, all multiplied by one factor, or the rest given in later steps"),
+    r"energy exchanged": ("energy exchanged", "the largest of kinetic energy, range of potential energy, and work of "
+                          "hand and of coupling"),
     r"event[- ]driven|event by event": ("event-driven", "the exact motion between impacts, with each impact located "
                                         "in time"),
     r"Colgate(?:'s)? (?:passivity )?(?:bound|condition)": ("Colgate's condition", "device damping b ≥ K T/2 + |B|: a "

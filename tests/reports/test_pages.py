@@ -169,7 +169,7 @@ def test_hard_cases_are_seen_at_a_glance_and_a_refusal_or_an_empty_table_is_no_n
         assert text in page, text
     stable = hard_case(("IAPB", "stable", 0.0))
     found = on_hard_cases((stable, hard_case(("IAPB", "gains energy", 0.5), title="stiff wall")))
-    assert found.verdict == MIXED and "1 of 2" in found.answer and "stiff wall (gains energy)" in found.answer
+    assert found.verdict == MIXED and "1 of 2" in found.answer and "“stiff wall” (gains energy)" in found.answer
     assert "1 cases were skipped" in on_hard_cases((stable, skipped)).answer
 
 
@@ -187,7 +187,7 @@ def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_table_is_a_
     drawn = Figure("t", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
     page = build_report(Evidence(manifest=RUNS), [Recipe("t", "", "", (), lambda _: drawn, "accuracy")])
     assert '<table aria-label="says &#34;x&#34;" class="grid' in page["report/accuracy.html"]
-    said = 'From <a href="manifest.html#runs-C10">C10</a>, a table. Again: <code>iapb reproduce --figure t</code>'
+    said = 'Data: <a href="manifest.html#runs-C10">C10</a>, a table. To compute it again: <code>iapb reproduce --fig'
     assert said in page["report/accuracy.html"] and "&lt;table" not in page["report/accuracy.html"]
 
 
@@ -245,7 +245,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     page = joined(Evidence(claims=(one("C20", *held, where, worst, printed, ours),), topics=topics), ())
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert all(part.name in first for part in held) and "Most hold." in first and "engines" not in first
-    assert "holds where tilt ≤ 0.015 rad" in first and "30 of 40 over all conditions; the stated range" in first
+    assert "holds where tilt ≤ 0.015 rad" in first and "30 of 40 over all conditions; where stated" in first
     assert "fails, as printed" in first and "fails (beyond the paper)" in first and "Fails in a quantity<" in first
     (line,) = (line for line in first.split('<span class="part"') if "the one that fails" in line)
     assert 'title="fails"' in line and "1 of 40, 7 cannot tell" in line
@@ -268,7 +268,7 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     topic = one("complementarity", tables={"piles": table_from(piles)})
     page = joined(Evidence(claims=(found,), topics=(topic,)))
     assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
-    assert "14 contacts are no safe limit" in page and f"agrees to {prose('3e-04')}" in page
+    assert "14 contacts are no safe limit" in page and f"at most {prose('3e-04')}" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
 
@@ -315,7 +315,7 @@ def test_the_first_screen_names_our_failures_the_gravest_first_and_what_is_fast(
     topics = (*(topic(key, MIXED, f"miss of {key}", "more") for key in given), topic("engines", MIXED))
     (fact,) = (fact for fact in facts(Evidence(topics=topics)) if fact.label == "Known failures")
     assert [id for _, id in fact.items] == [*given[:-3:-1], *given[3:0:-1], given[0]]  # engines: not our failure
-    assert fact.items[0][0] == "Miss of exact-energy (further failures on that page: 1)"
+    assert fact.items[0][0] == "Miss of exact-energy; 1 more on the page exact-energy"
 
 
 # Quantities that several pages quote
@@ -353,5 +353,5 @@ def test_a_quantity_that_is_not_quoted_is_named_and_the_time_of_a_step_is_on_the
     rate = one("haptic-rate", Part("p.", MIXED), said="14 of 18 speed targets met.", quantities=given)
     evidence = Evidence(topics=(rate,), inputs={"effect_steps": steps})
     assert set(unsaid(evidence)) == set(QUANTITIES) - {"time of a peg step", "speed targets"}
-    said = "One step of the corner scene takes 0.44 µs; a loop at 1 kHz allows 1000 µs. 14 of 18"
+    said = "A step of the peg that moves into the corner takes 0.44 µs; a loop at 1 kHz allows 1000 µs. 14 of 18"
     assert said in build_report(evidence, ())[FIRST_PAGE]

@@ -209,12 +209,12 @@ def _exact_misfit(case: ImpactCase, e: Fraction) -> float:
 
 
 C01 = losses(
-    "C01", "One frictionless collision never increases kinetic energy, and the loss is the stated quadratic form.",
+    "C01", "One frictionless collision never increases kinetic energy; the loss is vᵀJᵀW†Jv times a factor in e.",
     "Theorem 1, equation (18)", [Family(d, 1, 1, k) for d in (1, 3, 12) for k in (1e2, 1e5, 1e8)],
     {"quick": 16, "full": 200},
 )  # fmt: skip
 C02 = losses(
-    "C02", "Redundant simultaneous collisions never increase kinetic energy; the loss is the stated quadratic form.",
+    "C02", "Redundant simultaneous collisions never increase kinetic energy; the loss is that of C01.",
     "Theorem 2, equation (24)",
     [Family(*size, k) for size in ((3, 4, 2), (3, 6, 3), (6, 20, 4), (12, 60, 8)) for k in (1e2, 1e5)],
     {"quick": 12, "full": 150},
@@ -396,7 +396,7 @@ RANDOM, EXACT = "random impacts", "random impacts, in rationals"
 RENDERED = {"impacts of the peg, scaled to the device": "scale", "impacts of the peg, spread over steps": "spread"}
 _SIZES, _RESTITUTIONS = ((1, 1, 1), (3, 6, 3), (6, 20, 4), (12, 60, 8)), (-1.0, -0.9, -0.5, 0.0, 0.5, 0.9, 1.0)
 _PASSIVE = batches(
-    "C08", "The resolution is passive for every e in [-1, 1]; scaling and spreading the impulses stay inside.",
+    "C08", "The resolution is passive for every e in [-1, 1]; scaled or spread impulses act like an e in it.",
     place="Section VI", quantity="Largest relative gain of the tool's kinetic energy in one impact.",
     tolerance="10 d ε √κ(M) for random impacts; 100 ε for the peg, whose mass matrix is diagonal. In rational "
     "arithmetic: zero.",

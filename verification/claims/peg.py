@@ -59,7 +59,7 @@ RESOLVED[ALL_THREE] = float(np.linalg.norm([RESOLVED["x"], RESOLVED["y"], ARM * 
 NAMED = {"x": "x", "y": "y", "theta": "rotation", ALL_THREE: "all three together"}
 LIMITED = (*START, "force_limit")
 PAPERS = Condition().approach_velocity
-LARGER = "if only faster contacts collide"
+LARGER = "if slow contacts do not collide"
 CANNOT_TELL = (
     "A trial cannot tell if the distances of IAPB and of its nearer rival differ by less than the time step's error "
     "in the ideal world: 2.5e-5 m in x, 5e-5 m in y, 5e-3 rad in theta, 2.6e-4 m together."
@@ -385,7 +385,7 @@ def _limited_forces_say(table: Table) -> str:
 
 
 C14 = peg_claim(
-    "C14", "Impulses kept within the device's limits still exceed the penalty forces felt on contact.",
+    "C14", "The forces of impulses, kept within the device's limits, still exceed the penalty forces felt on contact.",
     limited=True, place="Section VI, Fig. 11",
     quantity="Peak force of the device's actuators in the run, per coordinate: IAPB with spread impulses, and PB, on "
     "a device with the same force limits.",
@@ -432,7 +432,7 @@ def _settling_says(table: Table) -> str:
 
 
 C15 = peg_claim(
-    "C15", "At 512 Hz the peg bounces less and settles sooner than with PB, with or without device limits.",
+    "C15", "With IAPB at 512 Hz, with or without device limits, the peg bounces less and settles sooner than with PB.",
     place="Section VII, Fig. 12 and 13 (an experiment there; a simulation of the pure mass of Section VI here)",
     quantity="How often a corner of the device's peg leaves a wall by more than 10 µm after touching it; time from "
     "the first contact until the device stays below 1 mm/s and 0.01 rad/s. Beyond the paper: larger approach "

@@ -132,8 +132,7 @@ def _ratio_says(table: Table) -> str:
                      f"{len(rows.rows)} sizes cannot tell.")  # fmt: skip
     return ("The ratio is the time of one frictionless impact by Lemke's method over that by IAPB, both compiled. "
             f"{' '.join(texts)} The paper's scene has at most six collisions at once. The paper speaks of whole time "
-            "steps with constraint stabilization. Such steps are timed on the page Against complementarity (table time "
-            "per step), but not in this claim, because there the solver is called from Python.")  # fmt: skip
+            "steps with constraint stabilization, which are not timed here.")  # fmt: skip
 
 
 C22 = Check(

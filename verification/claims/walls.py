@@ -132,10 +132,10 @@ C20 = Check(
 # C21: impulses against larger damping
 
 SAME_DAMPING, EQUAL_GAIN, BOTH, TUNED = RIVALS = (
-    "same damping", "penalty damping that gives the same force", "best damping of each law for each wall",
+    "same damping", "penalties so damped that the first force is the same", "best damping of each law for each wall",
     "penalties at their best damping and impulses at the paper's",
 )
-WHEREVER, NO_LATER = TESTS = "impulses settle wherever penalties do", "impulses settle no later"
+WHEREVER, NO_LATER = TESTS = "contact settles with impulses wherever without", "contact settles no later with impulses"
 FRESH = 5  # number of walls per loop drawn to confirm a region
 Case = tuple[Loop, Floats]  # and the stiffnesses of its walls
 

@@ -194,7 +194,7 @@ def _map_says(table: Table) -> Iterator[Part]:
     if beside.rows:
         ours, theirs = (float(np.mean(beside[f"left approaching by {law}"])) for law in ("IAPB", "the LCP"))
         yield Part.of(
-            "A neighbouring contact that touches but does not approach has no row in (19). How often does it approach "
+            "A neighbouring contact that touches but does not approach has no row in (21). How often does it approach "
             "after the impact?", f"in {100 * ours:.0f} % of such impacts with IAPB, and in {100 * theirs:.0f} % with "
             "the LCP on the same rows", "never", verdict_of_share(1.0 - ours), "touching")  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Dense piles, in which assumption (i) fails: (19)/(21) treats every colliding row as an equality.
+"""Dense piles, in which assumption (i) fails: (21) treats every colliding row as an equality.
 
 The spheres touch on a close-packed lattice. Only a share of the contacts is kept, so that redundancy varies; in reality
 slightly different diameters leave some contacts open. The pile falls on the floor at 1 m/s with a small random velocity
@@ -140,7 +140,7 @@ def _says(table: Table) -> Part:
     pulling = 100.0 * float(np.average([row["share of impulses that pull"] for row in beyond],
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
     return Part.of(
-        "In dense piles with every colliding contact as an equality (19), can impulses that push produce the velocity?",
+        "In dense piles with every colliding contact as an equality (21), can impulses that push produce the velocity?",
         f"in {agree:.0f} of {piles} impacts. The largest of these has {limit} contacts, which is no safe limit, "
         f"because many smaller impacts fail. In impacts with more than {limit} contacts, {pulling:.0f} % of the "
         "impulses pull. If impulses may only push (method \"poisson\", world IAPB-push), the velocity equals that of "
@@ -154,7 +154,7 @@ def piles(folders: Iterable[Path | str]) -> Check:
     return Check(
         key="piles", question="", cases=lambda study: groups_of(study.depth, folders), row=group_rows, says=_says,
         timed=TIMES, digits=3,
-        note="The table compares (21), with every row as an equality, and impulses that only push (method "
-        "\"poisson\"), at e = 0. Distances are in the kinetic metric, relative to |v⁻|. A pile agrees if some p >= 0 "
-        "gives the velocity of (21). Times are those of calls from Python, with checks of the arguments.",
+        note="The table compares (21), with every row as an equality, and impulses that only push (as in "
+        "the world IAPB-push), at e = 0. Distances are in the kinetic metric, relative to |v⁻|. A pile agrees if some "
+        "p >= 0 gives the velocity of (21). Times are those of calls from Python, with checks of the arguments.",
     )  # fmt: skip

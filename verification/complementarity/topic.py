@@ -17,7 +17,7 @@ from verification.complementarity.extensions import BAR, FRICTION, UNEQUAL
 from verification.complementarity.piles import piles
 from verification.complementarity.solvers import OWN, SOLVER_LIST, collections
 from verification.cost.solvers import IMPACT_TIMES
-from verification.finding import REPRODUCED, Part
+from verification.finding import REFUTED, REPRODUCED, Part
 from verification.mechanics.against_pinocchio import scene_difference
 from verification.table import Row, Table
 
@@ -53,10 +53,10 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     found = tables["map"]
     cases = sum(found["cases"]) or 1
     agree = sum(row["share that agrees"] * row["cases"] for row in found.records()) / cases
-    held = sum(part.verdict == REPRODUCED for part in parts)
+    held, fail = (sum(part.verdict == verdict for part in parts) for verdict in (REPRODUCED, REFUTED))
     return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree if and only "
             f"if pushing impulses (p >= 0) can produce IAPB's velocity: {sum(found['contradictions']) or 'no'} "
-            f"exceptions were found. {held} of the {len(parts)} findings hold in full.")
+            f"exceptions were found. Of the {len(parts)} findings on the page {held} hold in full, {fail} fail.")
 
 
 REFERENCES = Check(

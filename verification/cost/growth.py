@@ -99,8 +99,7 @@ def _growth_says(table: Table) -> Part:
 SCALING = Check(
     key="scaling", question="How does the time of an impact grow with its size?", cases=lambda _: (SIZES,),
     row=scaling, says=_scaling_says, timed=TIMES, digits=3,
-    note="Random impacts; the rank of the rows is two thirds of the number d of coordinates. The page Accuracy against "
-    "time has other impacts, so its times differ.",
+    note="Random impacts; the rank of the rows is two thirds of the number d of coordinates.",
 )  # fmt: skip
 FITTED = Check(
     key="fitted", question="With which power does it grow?", says=_growth_says, digits=3,

@@ -99,14 +99,13 @@ def solvers_say(table: Table) -> Part:
         slower.setdefault(f"{row['solver']} on the {row['impacts']}", []).append(row["contacts"])
     where = ", ".join(f"{name} at {' to '.join(map(str, sorted({min(found), max(found)})))} contacts"
                       for name, found in slower.items())
-    return faster("called from Python", "the solver", "pairs of solver and size", [more for _, more in pairs],
-                  where and f"than {where}")
+    return faster("called from Python", "the complementarity solver", "pairs of solver and size",
+                  [more for _, more in pairs], where and f"than {where}")
 
 
 def faster(how: str, rival: str, what: str, outcomes: Sequence[bool | None], where: str) -> Part:
     """Say in how many cases IAPB is faster than a rival, and where it is slower; None is a difference within noise."""
-    more, slower = outcomes.count(None), outcomes.count(False)
-    count = len(outcomes) - more
+    more, slower, count = outcomes.count(None), outcomes.count(False), sum(one is not None for one in outcomes)
     if not count:
         return Part(f"Time of one impact {how}: nothing was timed that differs clearly from IAPB.", NOT_COMPUTED,
                     timed=True)

@@ -438,7 +438,7 @@ def _motions_say(motions: Table) -> Iterator[Part]:
                      "no method is more exact, and MuJoCo's error is reached in less time", exact and fast,
                      f"in the whole motion “{scene}” " + (
                          "another method is as exact in less time" if exact else
-                         f"no time step makes IAPB as exact as {most} ({_error(ours)} against {_error(best[most])})"))
+                         f"no time step makes IAPB as exact as {most} (errors {_error(ours)}, {_error(best[most])})"))
 
 
 def _error(run: Row) -> str:

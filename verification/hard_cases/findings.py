@@ -53,11 +53,11 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     tried = [case for case in cases if case.computed]
     by = {case.title: {part.name: part.sentence for part in case.parts} for case in tried}
     ours = {title: next((found[name] for name in ENGINE if name in found), "") for title, found in by.items()}
-    failing = [f"{name} ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
+    failing = [f"{name}” ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
     skipped = len(cases) - len(tried)
     stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
     sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer and adds no energy."
-                + (f" It fails in: {'; '.join(failing)}." if failing else "")
+                + (f" It fails in “{'; “'.join(failing)}." if failing else "")
                 + (f" {skipped} cases were skipped because their files are absent." if skipped else ""))  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
     question = "Is the engine stable on problems on which other methods fail?"
@@ -65,7 +65,7 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
             for case in tried for row in case.tables[case.key].by_title()]  # fmt: skip
     table = EVERY_METHOD.table_of(rows)
     others = f" and {len(failing) - 1} more hard cases" if len(failing) > 1 else ""
-    miss = f"the engine fails in the hard case: {failing[0]}{others}" if failing else ""
+    miss = f"the engine fails in the hard case “{failing[0]}{others}" if failing else ""
     parts = (Part(sentence, verdict, miss=miss, quantities=(stable,)),)
     tables = {EVERY_METHOD.key: table.without("note") if rows else table}
     return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures, (stable,))

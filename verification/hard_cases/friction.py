@@ -50,8 +50,7 @@ def double_pendulum_motion() -> TrajectoryCase:
         "Kane and Levinson's double pendulum, its motion",
         _SOURCE,
         "a bounce with friction may throw the tip higher than the height from which it fell",
-        "the energy never exceeds that at the start; Newton's and Coulomb's laws, applied step by step, do not "
-        "guarantee this",
+        "the energy never exceeds that at the start, which Newton's and Coulomb's laws alone do not guarantee",
         "kinetic plus potential energy never exceeds that at the start; until the tip touches, the motion is that of "
         "the equations of two rods, integrated to twelve digits",
         on_floor("kane_levinson", "Kane and Levinson's double pendulum on a rough floor", _PENDULUM, _ON_TIP,

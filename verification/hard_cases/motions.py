@@ -26,8 +26,7 @@ def chatter() -> TrajectoryCase:
     """A ball dropped from 0.1 m with e = ½."""
     return TrajectoryCase(
         "Contact chatter: infinitely many bounces in 0.43 s", "Zeno's bouncing ball; textbook",
-        "the bounces accumulate at one instant: an event-driven method never passes it, and a time-stepping method may "
-        "keep bouncing",
+        "the bounces accumulate at one instant: an event-driven method never passes it, time stepping may bounce on",
         "the parabolas as far as the time step resolves them, then rest",
         f"parabolas of heights h e²ᵏ in closed form, at rest from {_END_OF_BOUNCES:.4f} s on",
         on_floor("chatter", "A ball that chatters to rest", [ball("ball", _RADIUS, _RADIUS + _HEIGHT, axis=[0, 1])],

@@ -74,8 +74,7 @@ def on_a_slope(title: str, name: str, count: int, sort: tuple[float, float, floa
         title, "Coulomb's law; springs of (5)",
         "a sticking contact must not creep; lever arms couple normal and friction forces",
         f"it moves by {1e6 * leans:.3g} μm as its springs deflect, and then stays",
-        "no contact slips because tan 20° < μ; the springs between two faces deflect by the force and moment that they "
-        "carry",
+        "no contact slips, because tan 20° < μ; the springs between two faces deflect under force and moment",
         _boxes(name, title, count, sort, slope, 0.0), measure, _ENGINE,
     )  # fmt: skip
 

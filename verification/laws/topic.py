@@ -115,8 +115,8 @@ def _laws(study: Study) -> Iterator[tuple[str, str]]:
 
 def _laws_say(table: Table) -> Iterator[Part]:
     caught = table.column(_CAUGHT)
-    yield Part(f"{sum(table.decided)} of {len(table.rows)} laws hold on random and on error-provoking inputs.",
-               verdict_of_law(table.holds))
+    yield Part(f"The engine keeps {sum(table.decided)} of {len(table.rows)} laws on random and on provoking inputs; "
+               f"{len(LAWS)} of them, on impacts, are those of check_passivity.", verdict_of_law(table.holds))
     yield Part(f"The checks catch {sum(caught)} of {len(caught)} faults that are planted in the code to test them.",
                verdict_of_law(caught))
 

@@ -22,9 +22,10 @@ from verification.table import Table
 def _answer(tables: Mapping[str, Table], _: Sequence[Part]) -> str:
     worst, balls = max(tables[AGAINST_PINOCCHIO.key]["worst"], default=0.0), tables[LINKED_IMPACTS.key]
     lost = min(balls.where(treatment=PER_BODY)["momentum change"])
-    return (f"Linkages, scenes and robots differ from Pinocchio by at most {worst:.1e}. With the paper's per-body rows "
-            f"(13)-(14), impacts of touching balls change the total momentum by at least {lost:.2g} times its value. "
-            "The contact filters remove false collisions only if they span a facet and the ball does not bounce.")
+    return (f"Mass matrices, forces and Jacobians differ from Pinocchio's by at most {worst:.1e} of the largest "
+            "entry. With (13)-(14), a row for each of two touching bodies, impacts of balls change the total momentum "
+            f"by at least {lost:.2g} times its value. On facets, the filters remove a ball's false collisions only if "
+            "the coherence distance reaches the next facet and the ball never bounces.")
 
 
 mechanics = Topic(
