@@ -146,5 +146,5 @@ C22 = Check(
     "machine the median of a size moved by up to 12 % (once by 19 %).",
     cases=lambda study: [Impact(problem, contacts) for contacts in SIZES for problem in PROBLEMS],
     row=_ratio, holds=costs_more, says=_ratio_says, draw=_fresh_impacts, parts=["problem"], conditions=["contacts"],
-    timed=TIMES, timed_rows=True, axes=("contacts", "decades", "problem"),
+    named={PILE: "piles"}, timed=TIMES, timed_rows=True, axes=("contacts", "decades", "problem"),
 )  # fmt: skip

@@ -47,8 +47,7 @@ _ON_TIP = {"restitution": 0.5, "friction": 0.5, "stiffness": 1e4, "damping": 100
 def double_pendulum_motion() -> TrajectoryCase:
     """The double pendulum falls on the floor from 1 mm and bounces for half a second."""
     return TrajectoryCase(
-        "Kane and Levinson's double pendulum, its motion",
-        _SOURCE,
+        "Kane and Levinson's double pendulum, its motion", _SOURCE,
         "a bounce with friction may throw the tip higher than the height from which it fell",
         "the energy never exceeds that at the start, which Newton's and Coulomb's laws alone do not guarantee",
         "kinetic plus potential energy never exceeds that at the start; until the tip touches, the motion is that of "

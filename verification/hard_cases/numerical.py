@@ -23,10 +23,8 @@ def contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
     rng = np.random.default_rng(10_000)
     rows = rng.integers(-2, 3, size=(count, 3)) @ np.array([[1, 0, 2, -1], [0, 1, 1, 1], [1, 1, 0, 2]])
     return HardCase(
-        name,
-        "meshes in contact, at the haptic rate",
-        why_hard, expected, np.diag([1.0, 2.0, 3.0, 4.0]), rows.astype(float).reshape(count, 4),
-        np.array([-1.0, -0.5, 0.25, 2.0]), 0.5,
+        name, "meshes in contact, at the haptic rate", why_hard, expected, np.diag([1.0, 2.0, 3.0, 4.0]),
+        rows.astype(float).reshape(count, 4), np.array([-1.0, -0.5, 0.25, 2.0]), 0.5,
         methods=("factored", "gram_pinv", "gram_cholesky", "damped", "svd"),
     )  # fmt: skip
 
@@ -71,10 +69,8 @@ def kahan_rows() -> HardCase:
     s = np.sqrt(1.0 - c * c)
     rows = s ** np.arange(n)[:, None] * (np.eye(n) - c * np.triu(np.ones((n, n)), 1))
     return HardCase(
-        "Kahan rows, n = 24",
-        "Kahan, Numerical linear algebra (1966): rank revealed wrongly by pivoted factorizations",
-        "smallest singular value far below every pivot",
-        "restitution is met and no energy is gained",
+        "Kahan rows, n = 24", "Kahan, Numerical linear algebra (1966): rank revealed wrongly by pivoted factorizations",
+        "smallest singular value far below every pivot", "restitution is met and no energy is gained",
         np.eye(n), rows, np.cos(np.arange(n)), 0.8, well_posed=False,
     )  # fmt: skip
 
