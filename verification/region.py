@@ -85,11 +85,13 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
         return None, f"no range of conditions is confirmed: {region} fails in {_failing(drawn)} fresh trials"
     region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
     new = f" and {region.fresh} fresh" if fresh else ""
+    open_ = drawn.holds.count(None) + inside.holds.count(None)
     counts = f"{region.searched} trials that led to this range, {region.others} other{new} trials hold"
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
         return None, f"no range of conditions is confirmed: where {region}, only {counts}"
     covered = f" ({region.share:.0%} of the tested range)" if region.share else ""
-    return region, f"where {region}{covered}, all {counts}"
+    undecided = f"; {open_} more cannot tell" if open_ else ""
+    return region, f"where {region}{covered}, all {counts}{undecided}"
 
 
 def _failing(trials: Table) -> str:

@@ -1,6 +1,6 @@
 """Every block of the documents is performed, and every example; what they show is what comes out.
 
-`IAPB_UPDATE_DOCS=1 pytest tests/docs` writes the outputs of today into the documents instead; shortened ones stay.
+`IAPB_UPDATE_DOCS=1 pytest -m '' tests/docs` writes today's outputs into the documents; shortened ones stay.
 """
 
 from __future__ import annotations

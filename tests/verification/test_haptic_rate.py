@@ -165,7 +165,7 @@ def test_a_method_that_our_limit_of_time_cuts_short_is_not_called_worthless(
 def test_a_motion_on_which_another_world_is_more_exact_is_a_miss() -> None:
     errors = {"IAPB, semi-implicit Euler": (1e-1, 1e-2), "PB, semi-implicit Euler": (1.0,), IDEAL: (1e-1, 5e-3)}
     [part] = MOTIONS.sentences(_table(**errors))
-    assert part.verdict == MIXED and "no time step makes IAPB as exact as ideal (1.0e-02 against 5.0e-03)" in part.miss
+    assert part.verdict == MIXED and "no time step makes IAPB as exact as ideal (errors 1.0e-02, 5.0e-03)" in part.miss
     [part] = MOTIONS.sentences(_table(**errors | {IDEAL: (1e-1, 2e-2)}))
     assert part.verdict == REPRODUCED
 

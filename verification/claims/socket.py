@@ -63,8 +63,8 @@ def _row(study: Study, case: Socket) -> Row:
     plain, filtered = (_found(study, each) for each in (case._replace(cluster=0.0, coherence=0.0), case))
     return {
         "part": COHERENCE_ALONE if not case.cluster else BOTH if case.coherence else CLUSTERING, **case.conditions,
-        "false collisions without filters": plain["false collisions"] - plain["on return"],
-        "false collisions": filtered["false collisions"] - filtered["on return"],
+        "false collisions without filters": plain["false collisions"],
+        "false collisions": filtered["false collisions"],
         "collisions on return": filtered["on return"],
         "doubled contacts without filters": plain["doubled contacts"], "doubled contacts": filtered["doubled contacts"],
     }  # fmt: skip
@@ -89,8 +89,9 @@ def _says(table: Table) -> str:
         f"must reach it as well: with both filters no false collision remains in {sum(reaching.decided)} of "
         f"{len(reaching.decided)} trials in which the distance is at least this jump + speed × step, and in "
         f"{sum(short.decided)} of {len(short.decided)} trials with a shorter distance. The finer the facets, the "
-        "nearer this is to the paper's condition. A ball that bounces off the facets collides when it returns; these "
-        f"{sum(both.column('collisions on return'))} contacts really begin and are not counted. With clustering alone "
+        f"nearer this is to the paper's condition. {sum(reaching.column('collisions on return'))} of the "
+        f"{sum(reaching.column('false collisions'))} that remain are those of a ball that bounced off the facets and "
+        "returns, which it does with little damping. With clustering alone "
         f"the remaining contact jumps from facet to facet and is new each time: the median is {collisions} false "
         f"collisions, against {unfiltered} without any filter. Clustering removes duplicate contacts: the median is "
         f"{doubled}, against {all_contacts} without it."
@@ -99,10 +100,10 @@ def _says(table: Table) -> str:
 
 C18 = Check(
     key="C18", question="Clustering and temporal coherence remove false collisions.", place="Section III",
-    quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket, without those on "
-    "its return after a step without contact. The facets approximate a round socket, in which a rolling ball does not "
-    "collide again; so each collision is false. Speed: the largest of a ball that rolls without loss. Facet jump: "
-    "distance between the contacts at an edge. Reach: coherence distance as a multiple of facet jump + speed × step.",
+    quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. The facets "
+    "approximate a round socket, in which a rolling ball does not collide again; so each collision is false. Speed: "
+    "the largest of a ball that rolls without loss. Facet jump: distance between the contacts at an edge. Reach: "
+    "coherence distance as a multiple of facet jump + speed × step.",
     tolerance="No false collision remains. A trial without any when both filters are off cannot tell.",
     cases=_cases, row=_row, says=_says, draw=_draw, parts=["part"],
     holds=lambda row: bool(row["false collisions"] == 0) if row["false collisions without filters"] else None,

@@ -68,7 +68,7 @@ C19 = Check(
 
 PILE = "independent contacts of a pile"
 PROBLEMS = {"redundant contacts of a patch": patch, PILE: pile}
-SIZES = (*range(1, 13), 16, 24, 32, 48, 64, 80, 96, 128, 192)
+SIZES = (*range(1, 13), 16, 24, 32, 48, 64, 80, 96, 128, 192, 300)
 # Where the arrays of an impact lie in memory changes its ratio by up to 40 %, so each size has several draws, each in
 # arrays of its own. Their median then moves by up to 12 % between processes on a busy machine (once by 19 %).
 DRAWS, ROUNDS, CLEAR = 4, {"quick": 2, "full": 4}, 1.1
@@ -86,9 +86,10 @@ class Impact(NamedTuple):
 
 
 def _fresh_impacts(study: Study, region: Region) -> list[Impact]:
-    """Return fresh trials of sizes inside a region; only in a pile, because a patch needs no region."""
+    """Return fresh trials of sizes inside a region that are not in SIZES; a patch needs no region."""
     sizes = np.unique(np.geomspace(*region.ends("contacts", SIZES), FRESH).round().astype(int)).tolist()
-    return [Impact(PILE, contacts, trial) for contacts in sizes for trial in range(1, REPEATED + 1)]
+    return [Impact(PILE, contacts, trial) for contacts in sizes if contacts not in SIZES
+            for trial in range(1, REPEATED + 1)]
 
 
 def _ratio(study: Study, case: Impact) -> dict[str, Any]:
