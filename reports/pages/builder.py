@@ -185,8 +185,8 @@ def counted(part: Part) -> str:
     cases = f" ({part.cases} cases in these trials)" if part.cases else ""
     region = part.region
     share = f" ({region.share:.0%} of the tested range)" if region and region.share else ""
-    where = (f" over all conditions; where stated{share}, {region.searched} of these led to the range, "
-             f"{region.others + region.fresh} other or new ones confirm it") if region else ""  # fmt: skip
+    where = (f" over all conditions; range found from {region.searched} trials{share}, confirmed by "
+             f"{region.others + region.fresh} others") if region else ""  # fmt: skip
     return f"{part.held} of {part.decided}{cases}{unknown}{where}"
 
 

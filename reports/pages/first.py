@@ -31,8 +31,8 @@ COUNTED = dict(zip(KINDS, (
 # Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
 GRAVEST = ("exact-energy", "hard-cases", "scene-ledger", "engines", "complementarity", "stability", "mechanics")
 NEXT = (
-    ("Read for five minutes", "the idea, one formula", "idea"),
-    ("Choose a method", "by time and contacts", "accuracy"),
+    ("First, read for five minutes", "the idea, one formula", "idea"),
+    ("then choose a method", "by time and contacts", "accuracy"),
     ("Test your own solver", "laws, counterexamples", "properties"),
     ("All data", "runs, tables, commands", "manifest"),
 )
@@ -70,7 +70,7 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
         if text := " ".join(said for held, said in found if held is wanted):
             told.append(Fact(label, text, "C11" if wanted else "C10", kind))
     if (energy := topics.get("exact-energy")) is not None:
-        told.append(Fact("Energy", f"{energy.answer} {LIMIT}", energy.key,
+        told.append(Fact("Energy of impacts", f"{energy.answer} {LIMIT}", energy.key,
                          KINDS[0] if energy.verdict == REPRODUCED else KINDS[4]))  # fmt: skip
     if (rate := topics.get("haptic-rate")) is not None:
         told.append(Fact("Is it fast?", " ".join((*_speed(evidence, rate), rate.answer)), rate.key))
@@ -111,8 +111,8 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
         return
     each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper shows one start, and its position is lost. Over all starts that we tested and that are not too "
-        f"close to call, impulses bring the hand's path nearest to the path at a rigid wall in {each}.")
+        "The paper shows one start, in a picture that is lost. Of all starts that we tested and that are not too close "
+        f"to call, impulses bring the hand's path nearest to the path at a rigid wall in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found = {name: closest_in(small)[name] for name in ("x", "y")}
         each = " and ".join(f"{name} in {ahead} of {told}" for name, (ahead, told) in found.items())

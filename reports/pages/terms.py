@@ -75,7 +75,7 @@ TERMS: dict[str, tuple[str, str]] = {
     r"NCP|CCP": ("NCP, CCP", "complementarity problems with Coulomb's friction cone: the law itself, and its convex "
                  "relaxation"),
     r"Delassus|W": ("Delassus matrix W", "J M⁻¹ Jᵀ, the inverse mass that the contacts feel"),
-    r"trials?": ("trial", "one tested condition of a claim: the claim holds there, fails, or cannot be told "
+    r"trials?": ("trial", "one tested condition of a claim: the claim holds there, fails, or cannot be decided "
                   "(the values differ by less than their error)"),
     r"coherence|clustering": ("coherence, clustering", "the paper's two filters. Coherence: a contact that moved less "
                               "than the coherence distance in a step is old. Clustering: near contacts merge"),

@@ -245,7 +245,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     page = joined(Evidence(claims=(one("C20", *held, where, worst, printed, ours),), topics=topics), ())
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert all(part.name in first for part in held) and "Most hold." in first and "engines" not in first
-    assert "holds where tilt ≤ 0.015 rad" in first and "30 of 40 over all conditions; where stated" in first
+    assert "holds where tilt ≤ 0.015 rad" in first and "30 of 40 over all conditions; range found from" in first
     assert "fails, as printed" in first and "fails (beyond the paper)" in first and "Fails in a quantity<" in first
     (line,) = (line for line in first.split('<span class="part"') if "the one that fails" in line)
     assert 'title="fails"' in line and "1 of 40, 7 cannot tell" in line
@@ -308,7 +308,7 @@ def test_the_first_screen_names_our_failures_the_gravest_first_and_what_is_fast(
 
     safe, lacking = topic("exact-energy", REPRODUCED), topic("haptic-rate", NOT_COMPUTED)
     found = told(topics=(safe, lacking))
-    assert found["Energy"] == f"a {LIMIT}" and "Is it fast?" not in found
+    assert found["Energy of impacts"] == f"a {LIMIT}" and "Is it fast?" not in found
     assert found["Known failures"] == "Not computed: haptic-rate."
     assert made_from(Evidence(provenance={"commit": "c" * 40})) == f"commit {'c' * 12}"
     given = ("haptic-rate", "mechanics", "stability", "complementarity", "hard-cases", "exact-energy")

@@ -396,7 +396,7 @@ RANDOM, EXACT = "random impacts", "random impacts, in rationals"
 RENDERED = {"impacts of the peg, scaled to the device": "scale", "impacts of the peg, spread over steps": "spread"}
 _SIZES, _RESTITUTIONS = ((1, 1, 1), (3, 6, 3), (6, 20, 4), (12, 60, 8)), (-1.0, -0.9, -0.5, 0.0, 0.5, 0.9, 1.0)
 _PASSIVE = batches(
-    "C08", "The resolution is passive for every e in [-1, 1]; scaled or spread impulses act like an e in it.",
+    "C08", "The resolution is passive for every e in [-1, 1]; scaled or spread impulses act like another e in [-1, 1].",
     place="Section VI", quantity="Largest relative gain of the tool's kinetic energy in one impact.",
     tolerance="10 d ε √κ(M) for random impacts; 100 ε for the peg, whose mass matrix is diagonal. In rational "
     "arithmetic: zero.",

@@ -172,8 +172,8 @@ def _trajectory_says(table: Table) -> str:
     rests, moves = (papers.where(**{"ideal settles": wanted}) for wanted in (True, False))
     evenly = papers.only(tilt in EVEN_TILTS for tilt in papers["tilt"])
     return (
-        f"The paper shows one start, and its position is lost. At ours, tilted by {start.tilt:g} rad, the distances of "
-        f"{', '.join(WORLDS)} to ideal are {found}. Of the tested starts that can tell, IAPB is closest in "
+        f"The paper shows one start, in a picture that is lost. At ours, tilted by {start.tilt:g} rad, the distances "
+        f"of {', '.join(WORLDS)} to ideal are {found}. Of the tested starts that can tell, IAPB is closest in "
         f"{counts(papers)} (in the kinetic metric). The counts depend on the tilt. Tilts up to {start.tilt:g} rad: "
         f"{counts(small_tilts(papers))}. Evenly spaced tilts: {counts(evenly)}. In the ideal world the peg does not "
         f"settle within the run from {len(moves.where(part='x').rows)} of {len(papers.where(part='x').rows)} starts "
@@ -248,7 +248,7 @@ def _forces_say(table: Table) -> str:
 
 
 C11 = peg_claim(
-    "C11", "Forces are large on new contact, only balance the hand while in contact, and are closest to ideal.",
+    "C11", "IAPB's forces are large on new contact, only balance the hand while in contact, are closest to ideal.",
     place="Section VI, Fig. 8",
     quantity="Peak force of the device's actuators in the run; mean of |F + F_hand| over the steps in contact without "
     "a collision; mean of |F − F_ideal| over the steps, since the paper names no norm. Beyond the paper: the RMS of "

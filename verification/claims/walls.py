@@ -135,7 +135,8 @@ SAME_DAMPING, EQUAL_GAIN, BOTH, TUNED = RIVALS = (
     "same damping", "penalties so damped that the first force is the same", "best damping of each law for each wall",
     "penalties at their best damping and impulses at the paper's",
 )
-WHEREVER, NO_LATER = TESTS = "contact settles with impulses wherever without", "contact settles no later with impulses"
+WHEREVER, NO_LATER = TESTS = ("contact settles with impulses wherever it settles without",
+                              "contact settles no later with impulses")
 FRESH = 5  # number of walls per loop drawn to confirm a region
 Case = tuple[Loop, Floats]  # and the stiffnesses of its walls
 
@@ -200,7 +201,7 @@ def _settling_says(table: Table) -> str:
 
 
 C21 = Check(
-    key="C21", question="Impulse forces make contact more stable than a damping of the same gain, sustained, does.",
+    key="C21", question="Impulses make contact more stable than a sustained damping of the same gain.",
     place="Section VII",
     quantity="Settling time of a mass of 2 kg that the hand pushes against a sampled wall; its motion between samples "
     "is exact. Impulses at the paper's damping are compared with penalties at the same damping, and with penalties at "

@@ -54,9 +54,10 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     cases = sum(found["cases"]) or 1
     agree = sum(row["share that agrees"] * row["cases"] for row in found.records()) / cases
     held, fail = (sum(part.verdict == verdict for part in parts) for verdict in (REPRODUCED, REFUTED))
-    return (f"IAPB and the Newton LCP give the same velocity in {agree:.0%} of {cases} impacts. They agree if and only "
-            f"if pushing impulses (p >= 0) can produce IAPB's velocity: {sum(found['contradictions']) or 'no'} "
-            f"exceptions were found. Of the {len(parts)} findings on the page {held} hold in full, {fail} fail.")
+    return (f"IAPB and the LCP with Newton's law of restitution give the same velocity in {agree:.0%} of {cases} "
+            f"impacts. They agree if and only if pushing impulses (p >= 0) can produce IAPB's velocity: "
+            f"{sum(found['contradictions']) or 'no'} exceptions were found. Of the {len(parts)} findings on the page, "
+            f"{held} hold in full and {fail} fail.")
 
 
 REFERENCES = Check(

@@ -149,7 +149,7 @@ def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
 
     return TrajectoryCase(
         name, "Coulomb's law",
-        "a change of one per cent in the force decides whether it moves", expected,
+        "a change of one per cent in the force decides whether the block moves", expected,
         f"Coulomb's law in closed form: {slide * 1e3:.4g} mm after {_DURATION:g} s",
         _block(share), measure, _WORLDS,
     )  # fmt: skip
@@ -252,7 +252,7 @@ def stick_slip() -> TrajectoryCase:
 
     return TrajectoryCase(
         "Stick-slip oscillator and its limit cycle",
-        "Den Hartog, Trans. ASME 53 (1931); the block on a belt of textbooks",
+        "Den Hartog, Trans. ASME 53 (1931); the textbooks' block on a belt",
         "each cycle ends in a stick of zero length, at zero speed and at the very edge of the friction cone",
         "one slip, one stick, then for ever the same cycle of 2π/ω",
         "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "

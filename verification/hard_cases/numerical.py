@@ -57,7 +57,7 @@ def hilbert_rows() -> HardCase:
     rows = 1.0 / (np.arange(n)[:, None] + np.arange(n) + 1.0)
     return HardCase(
         "Hilbert rows, n = 8", "Hilbert (1894); the classical rank decision",
-        "the exact rank is full, the condition number 1.5e10: singular values lie on both sides of any tolerance",
+        "the exact rank is full, the condition number 1.5e10: singular values lie on both sides of any usual tolerance",
         "restitution is met and no energy is gained; a method may keep any number of small singular values",
         np.eye(n), rows, np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]), 0.5, well_posed=False,
     )  # fmt: skip
