@@ -73,15 +73,15 @@ imports: setup ## import-linter: the packages import one way
 
 .PHONY: pytest
 pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
-	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadfile -q $(PYTEST_ARGS)
 
 .PHONY: thorough
 thorough: setup ## the tests that `make test` leaves out: attacks and kills, a browser, the documents, Coq; CI runs them
-	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q -m thorough $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadfile -q -m thorough $(PYTEST_ARGS)
 
 .PHONY: deep
 deep: setup ## the test suite with long property searches, and the kit on sound resolvers at 100 seeds (hours)
-	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadgroup -q -m '' $(PYTEST_ARGS)
+	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist load -q -m '' $(PYTEST_ARGS)
 
 .PHONY: format
 format: setup ## let ruff repair what it can

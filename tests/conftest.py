@@ -1,4 +1,4 @@
-"""What every test shares: the hypothesis profiles, how interpreted kernels overflow, which tests share a worker."""
+"""What every test shares: the hypothesis profiles, and how interpreted kernels overflow."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import os
 os.environ.setdefault("IAPB_COMPILE", "whole")  # many scenes share one set of kernels; a test of its own compiles less
 
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, settings
 from numba.core import config
 
@@ -21,12 +20,3 @@ settings.register_profile(
 settings.load_profile(os.environ.get("IAPB_HYPOTHESIS_PROFILE", "quick"))
 if config.DISABLE_JIT:
     np.seterr(over="ignore", under="ignore", invalid="ignore")  # as silent as in compiled kernels
-
-
-@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in its own hook
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests that share what a file makes once on one worker: `make test` runs with --dist loadgroup."""
-    for item in items:
-        fixtures = item._fixtureinfo.name2fixturedefs.values()  # type: ignore[attr-defined]
-        if any(each.scope == "module" for given in fixtures for each in given):
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
