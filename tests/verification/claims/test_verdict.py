@@ -173,7 +173,9 @@ def test_a_region_that_is_there_is_found_and_confirmed_with_its_counts():
     assert part.outcome == "holds where tilt <= 0.2 rad"
     assert part.region.share == pytest.approx(2 / 3) and part.region.fresh == 20
     assert part.region.searched + part.region.others == part.held
-    assert "67% of the tested range" in part.sentence
+    assert "67% of the tested range" in part.sentence and "more cannot tell" not in part.sentence
+    half = judge_part("x", trials(gentle), drawn_by(lambda row: None if row["width"] > 2.5 else gentle(row), 60))
+    assert half.region.fresh < 60 and f"; {60 - half.region.fresh} more cannot tell" in half.sentence
 
 
 def test_a_region_may_bound_two_conditions():
