@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import ast
 import importlib.util
-import math
 import pickle
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from numba import njit
 from numba.core.errors import NumbaError
 
 import iapb.run
@@ -28,16 +24,13 @@ def growing_list(x):
     return made[-1]
 
 
-ALLOCATE = [lambda x: np.zeros(3)[0], lambda x: np.empty_like(x).shape[0], lambda x: x.copy()[0],
-            lambda x: (x + x)[0], lambda x: x[x > 0.0][0], growing_list]
+ALLOCATE = [lambda x: np.zeros(3)[0], lambda x: (x + x)[0], growing_list]
 
 
 @pytest.mark.parametrize("function", ALLOCATE)
 def test_a_kernel_that_would_allocate_does_not_compile(function):
-    x = np.array([1.0, 2.0, 3.0])
-    assert njit(function)(x) == function(x)  # numba itself would
     with pytest.raises(NumbaError):
-        kernel(function)(x)
+        kernel(function)(np.array([1.0, 2.0, 3.0]))
 
 
 @pytest.mark.parametrize("function", [lambda x: x[1:][0], lambda x: (x[0], x[1])[1]])  # neither a slice nor a tuple
@@ -57,58 +50,23 @@ class Inner(NamedTuple):
 class Outer(NamedTuple):
     count: int
     inner: Inner
-    weight: float
-    vector: np.ndarray
-    mask: np.ndarray
     small: np.ndarray
 
 
 @kernel
-def read(b, out):
-    total, hits = 0.0, 0
-    for i in range(b.inner.table.shape[0]):
-        for j in range(b.inner.table.shape[1]):
-            total += (i + 1) * (j + 2) * b.inner.table[i, j]
-    for k in range(b.mask.shape[0]):
-        hits += (k + 1) * b.mask[k]
-    out[0], out[1], out[2], out[3] = b.count, b.weight, b.inner.flag, b.inner.table.shape[0]
-    out[4], out[5], out[6], out[7], out[8] = b.inner.table.shape[1], total, b.vector[-1], hits, b.small[0]
+def read(b):
+    return b.inner.table[-1, -1] + b.small[0] + b.inner.flag
 
 
-@kernel
-def write(b):
-    b.vector[0] = 42.0
-    b.inner.table[0, 0] = -1.0
-    b.mask[0] = not b.mask[0]
-
-
-def outer(count=3, flag=True, weight=0.5, shape=(2, 3), mask=(True, False, True)):
-    table = np.arange(float(math.prod(shape))).reshape(shape)
-    return Outer(count, Inner(flag, table), weight, np.array([1.5, -2.5]), np.array(mask), np.array([7], np.int8))
-
-
-@given(st.integers(-(2**62), 2**62), st.booleans(), st.floats(allow_nan=False), st.tuples(*[st.integers(1, 4)] * 2),
-       st.lists(st.booleans(), min_size=1, max_size=5))
-def test_a_kernel_reads_from_a_block_what_python_reads(count, flag, weight, shape, mask):
-    made, out = block(outer(count, flag, weight, shape, mask)), np.zeros(9)
-    read(made, out)
-    table = made.inner.table
-    total = sum((i + 1) * (j + 2) * table[i, j] for i in range(shape[0]) for j in range(shape[1]))
-    hits = sum(k + 1 for k, on in enumerate(mask) if on)
-    assert out.tolist() == [float(count), weight, float(flag), *shape, total, -2.5, hits, 7.0]
-
-
-def test_a_kernel_writes_to_the_arrays_themselves():
-    plain = outer()
-    write(block(plain))
-    assert plain.vector[0] == 42.0 and plain.inner.table[0, 0] == -1.0 and not plain.mask[0]
+def outer(**values):
+    given = {"count": 3, "inner": Inner(True, np.arange(6.0).reshape(2, 3)), "small": np.array([7], np.int8)}
+    return Outer(**given | values)
 
 
 def test_a_block_keeps_its_arrays_alive():
-    made, out = block(outer(shape=(60, 60))), np.zeros(9)
+    made = block(outer(inner=Inner(True, np.ones((60, 60)))))
     churn = [np.full(3600, np.nan) for _ in range(200)]
-    read(made, out)
-    assert len(churn) == 200 and np.isfinite(out).all() and out[3] == 60
+    assert len(churn) == 200 and read(made) == 9.0
 
 
 def test_a_block_is_made_once_and_has_the_names_of_its_content_alone():
@@ -121,12 +79,10 @@ def test_a_block_is_made_once_and_has_the_names_of_its_content_alone():
 
 
 def test_types_of_blocks_differ_where_their_fields_do_and_survive_a_file():
-    same, other = block(outer()), block(outer()._replace(small=np.array([7], np.int64)))
-    assert block(outer(count=9, shape=(5, 1))).block_type == same.block_type
+    same, other = block(outer()), block(outer(small=np.array([300], np.int64)))
+    assert block(outer(count=9, inner=Inner(False, np.ones((5, 1))))).block_type == same.block_type
     assert other.block_type != same.block_type
-    out = np.zeros(9)
-    read(other, out)
-    assert out[8] == 7.0  # compiled anew, with another width
+    assert read(other) == 306.0  # compiled anew, with another width
     assert pickle.loads(pickle.dumps(same.block_type)) == same.block_type
 
 

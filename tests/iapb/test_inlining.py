@@ -48,23 +48,10 @@ def _sum(values: Any) -> Any:
     return total - _entry(values, 0) * _entry(values, 0)
 
 
-def test_the_bitcode_is_compiled_with_the_options_of_the_kernel() -> None:
-    """Asked of the options: once numba has refused to allocate, it refuses everywhere in the process."""
-    compiled = compile_as_whole(_square.py_func, _nrt=False)
-    assert compiled.targetoptions["_nrt"] is False
-    assert compiled.bitcode.targetoptions["_nrt"] is False
-
-
 def test_the_caller_has_all_that_it_calls_and_only_it_becomes_machine_code() -> None:
     assert _sum(np.array([1.0, 2.0, 3.0])) == 4.0 + 9.0
     assert len(_sum.overloads) == 1 and not _square.overloads and not _squared_if.overloads and not _entry.overloads
     assert _entry(np.array([3, 4]), 1) == 4 and len(_entry.overloads) == 1  # Python can call the inner kernel, too
-
-
-def test_a_constant_argument_makes_no_version_of_its_own() -> None:
-    caller = compile_as_whole(_sum.py_func)
-    caller(np.ones(2))
-    assert len(_squared_if.bitcode.overloads) == 1
 
 
 def test_what_is_not_inlined_has_no_name_that_another_library_could_be_given(monkeypatch: pytest.MonkeyPatch) -> None:

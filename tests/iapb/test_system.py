@@ -8,23 +8,11 @@ import pytest
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
-from iapb.scene import find_scene, load_scene, scene_names
+from iapb.scene import find_scene, load_scene
 from iapb.system import System, coupling_of
 
 PEG = load_scene(find_scene("peg_corner"))
 ARM = load_scene(find_scene("arm_pushing"))
-
-
-@pytest.mark.parametrize("name", scene_names())
-def test_a_state_starts_where_the_scene_says(name):
-    scene = load_scene(find_scene(name))
-    system = System(scene)
-    state = system.make_state()
-    assert state.q.tolist() == [x for body in scene.bodies for x in body.position]
-    assert state.v.tolist() == [x for body in scene.bodies for x in body.velocity]
-    assert state.mass_matrix == pytest.approx(system.mechanism.mass_matrix(state.q), abs=0.0)
-    assert np.tril(state.lower) @ np.tril(state.lower).T == pytest.approx(state.mass_matrix, rel=1e-14)
-    assert system.dt == 1.0 / scene.rate
 
 
 @pytest.mark.parametrize("scene", [PEG, ARM], ids=lambda scene: scene.name)
@@ -36,16 +24,6 @@ def test_the_device_is_the_hand_held_tree_alone(scene):
     assert device.mass_matrix(q[coordinates]) == pytest.approx(system.mechanism.mass_matrix(q)[tool, tool], abs=1e-15)
     port = system.make_port(coupling_of(scene, "four-channel"))
     assert np.array_equal(port.device_q, q[coordinates])
-
-
-def test_the_tool_is_found_behind_other_bodies():
-    """The hand may hold any tree: ranges follow the bodies, not the first place."""
-    bodies = [body.model_dump() for body in ARM.bodies]
-    turned = ARM.with_values({"bodies": [bodies[2], bodies[0], bodies[1]]})
-    assert System(ARM).tool_dofs == (0, 2) and System(turned).tool_dofs == (3, 5)
-    first, second = System(ARM).device_mechanism(), System(turned).device_mechanism()
-    assert first.names == second.names
-    assert first.mass_matrix([0.3, 0.4]) == pytest.approx(second.mass_matrix([0.3, 0.4]), abs=0.0)
 
 
 def test_limits_are_those_of_the_tools_coordinates_alone():

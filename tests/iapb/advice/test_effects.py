@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 from iapb.advice.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
-from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented, Penalty
+from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.scene import Scene, find_scene, load_scene, scene_names
-from iapb.simulation import Simulation
 from reference.time_stepping import RigidConstraints
 
 PEG = load_scene(find_scene("peg_corner"))
@@ -125,16 +124,6 @@ def test_laws_and_couplings_are_known_by_name_and_an_unknown_law_uses_all() -> N
     for law in (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty()):
         assert decide_effects(PEG, law.name, None, "full") == decide_effects(PEG, law)
     assert {coupling.name for coupling in (FourChannel, UnilateralCoupler)} == set(COUPLING_FIELDS)
-
-
-def test_the_record_and_the_switches_are_one_decision() -> None:
-    scene = PEG.with_values({"contact.friction": 0.3, "gravity": [0.0, 1.0], "contact.cluster_distance": 1e-4})
-    for law in ENGINE_LAWS.values():
-        simulation = Simulation(scene, law)
-        on = {found.name for found in simulation.effects if found.active}
-        for name in ("gravity", "varying_inertia", "velocity_terms", "impulses", "unequal_restitution",
-                     "impact_friction", "clustering"):
-            assert getattr(simulation.world.switches, name) == (name in on), (law, name)
 
 
 @pytest.mark.parametrize("name", scene_names())

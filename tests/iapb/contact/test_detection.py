@@ -281,9 +281,3 @@ def test_more_contacts_than_there_is_room_for_are_an_error(
     system.capacity = number - 1
     with pytest.raises(IapbError):
         system.contacts_at(at_places(system, place, *([[0.0] * len(place)] if "normal" not in b else [])), gap)
-
-
-def test_a_hundred_discs_on_one_place_are_more_than_a_run_has_room_for() -> None:
-    bodies = [{"name": f"d{k}", "joint": "planar", "mass": 0.1, "inertia": 1e-5, "shapes": [DISC]} for k in range(100)]
-    with pytest.raises(IapbError):
-        simulate(scene_of(bodies, []), steps=1)

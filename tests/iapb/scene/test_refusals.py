@@ -302,16 +302,6 @@ def test_no_value_whatever_ends_in_another_error(values: dict[str, Any]) -> None
 
 @given(st.text(alphabet=st.sampled_from("[]{}:,-?&*!|>'\"%@#~ \n\tab01.e"), max_size=60))
 def test_any_text_is_a_scene_or_a_scene_error(text: str) -> None:
-    check(text)
-
-
-@pytest.mark.parametrize("unit", ["[", "{a: ", "- ", "? ", "a:\n ", "&a ", "*a ", "!a ", "'", '"', "|\n", "a: &a [*a,"])
-def test_endless_repetition_ends_soon(unit: str) -> None:
-    check(unit * (5_000 // len(unit)))
-
-
-def check(text: str) -> None:
-    """Read a text; a refusal carries mistakes with places inside the file."""
     try:
         scene_from_text(text)
     except SceneError as refusal:

@@ -1,4 +1,4 @@
-"""Free motion keeps momentum to rounding, makes no energy, and converges with the order that it states."""
+"""Free motion keeps both momenta to rounding and makes no energy."""
 
 from __future__ import annotations
 
@@ -37,6 +37,9 @@ FLAT_ROBOT = ({"name": "body", "joint": "planar", "mass": 1.0, "inertia": 1e-2, 
               FLAT | {"name": "two", "parent": "one", "origin": [0.2, 0], "velocity": [-9.0]})
 CASES = {
     "a body at 100 rad/s": scene(body(100.0)), "a body at 1000 rad/s": scene(body(1000.0), duration=0.2),
+    "a plate": scene(body(100.0, inertia=[7.5e-3, 3.3e-3, 1.1e-2])),
+    "a rod": scene(body(1000.0, inertia=[4e-5, 1.3e-2, 1.3e-2]), duration=0.2),
+    "a ball": scene(body(1000.0, inertia=[4e-3] * 3)),
     "its centre elsewhere": scene(body(50.0, center_of_mass=[0.1, -0.2, 0.05])),
     "turned inertia": scene(body(50.0, inertia=[[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]])),
     "a floating robot": scene(*ROBOT), "a planar one": scene(*FLAT_ROBOT, dimensions=2),
@@ -57,21 +60,6 @@ def test_both_momenta_are_kept_to_rounding_and_the_energy_nearly(name: str) -> N
         assert drift <= 3e-15 * run.steps * np.abs(found[0]).max()
     kinetic = run.energy["kinetic"]
     assert np.abs(kinetic / kinetic[0] - 1.0).max() < (1e-12 if "robot" in name or "planar" in name else 1e-6)
-
-
-@pytest.mark.parametrize(("bodies", "values"), [
-    (ROBOT, {"duration": 0.2}), (FLAT_ROBOT, {"duration": 0.2, "dimensions": 2}),
-    ((LINK | {"name": "one", "axis": [0, 1, 0]}, LINK | {"name": "two", "parent": "one", "axis": [0, 1, 0],
-                                                         "origin": [0.2, 0, 0]}), {"gravity": [0, 0, -9.81]}),
-    (({"name": "top", "joint": "spherical", "mass": 1.0, "center_of_mass": [0, 0, 0.05],
-       "inertia": [1e-3, 1.2e-3, 5e-4], "position": [0.28, 0, 0, 0.96], "velocity": [0, 0, 30.0]},),
-     {"gravity": [0, 0, -9.81], "duration": 0.2}),
-])  # fmt: skip
-def test_linkages_and_tops_converge_with_order_two(bodies: Any, values: dict[str, Any]) -> None:
-    given = scene(*bodies, **values)
-    ends = [simulate(given.with_values({"rate": rate})).q[-1] for rate in (2000.0, 4000.0, 8000.0, 64000.0)]
-    errors = [np.abs(end - ends[-1]).max() for end in ends[:-1]]
-    assert np.log2(errors[1] / errors[2]) > 1.7
 
 
 def test_principal_axes_turn_the_inertia_into_its_moments() -> None:
