@@ -38,10 +38,6 @@ def step(mass, v, f, rows, gap, e, **options):  # type: ignore[no-untyped-def]
                       **options)  # fmt: skip
 
 
-def energy(v, mass=BAR):  # type: ignore[no-untyped-def]
-    return 0.5 * float(v @ mass @ v)
-
-
 # one mass of 2 kg at −1 m/s: gap, restitution, options, v⁺
 HAND = [
     (1e-4, 0.0, {}, -1e-4 / DT),  # an open plastic contact closes exactly and does not pass
@@ -56,13 +52,6 @@ def test_one_mass_by_hand(gap: float, e: float, options: Any, expected: float) -
     result = step([[2.0]], [-1.0], [0.0], [[1.0]], [gap], e, **options)
     assert result.velocity[0] == pytest.approx(expected, abs=1e-15)
     assert result.impulse[0] == pytest.approx(2.0 * (1.0 + result.velocity[0]), abs=1e-14)
-
-
-def test_resting_contact_carries_the_load() -> None:
-    """A box on two equal corners under its weight: it stays, and the impulses sum to the weight times dt."""
-    result = step(np.diag([2.0, 0.005]), [0.0, 0.0], [-20.0, 0.0], [[1.0, 0.01], [1.0, -0.01]], [0.0, 0.0], 0.0)
-    assert np.abs(result.velocity).max() <= 1e-16 and result.impulse.min() > 0.0
-    assert result.impulse.sum() == pytest.approx(20.0 * DT, rel=1e-13)
 
 
 @given(st.integers(0, 10_000))
@@ -116,14 +105,16 @@ def test_velocities_that_cancel_are_judged_by_their_rounding() -> None:
     assert result.impulse == pytest.approx([9.81e3 * DT, 9.81e3 * DT], rel=1e-5)
 
 
-@pytest.mark.parametrize(("given_", "says"), [
-    ({"restitution": np.array([0.5])}, "restitution"), ({"restitution": np.array([0.5, 1.5])}, "restitution"),
-    ({"restitution": -0.1}, "restitution"), ({"restitution": 0.0, "stabilization": 2.0}, "stabilization"),
-    ({"restitution": 0.0, "scheme": "euler"}, "scheme"),
+@pytest.mark.parametrize(("call", "given_"), [
+    (velocity_bounds, {"restitution": np.array([0.5])}), (velocity_bounds, {"restitution": np.array([0.5, 1.5])}),
+    (velocity_bounds, {"restitution": -0.1}), (velocity_bounds, {"stabilization": 2.0, "restitution": 0.0}),
+    (velocity_bounds, {"scheme": "euler", "restitution": 0.0}), (RigidConstraints, {"scheme": "euler"}),
+    (RigidConstraints, {"friction": "viscous"}),
 ])  # fmt: skip
-def test_bounds_out_of_range_are_refused(given_: dict[str, Any], says: str) -> None:
-    with pytest.raises(ArgumentError, match=says):
-        velocity_bounds(np.zeros(2), np.zeros(2), dt=DT, **given_)
+def test_settings_out_of_range_are_refused(call: Any, given_: dict[str, Any]) -> None:
+    first = (np.zeros(2), np.zeros(2)) if call is velocity_bounds else ()
+    with pytest.raises(ArgumentError, match=next(iter(given_))):
+        call(*first, **given_ | ({"dt": DT} if first else {}))
 
 
 # --- restitution: one e for all contacts, or one for each -----------------------------------------------------------
@@ -135,20 +126,6 @@ def test_each_contact_returns_its_own_share(e: tuple[float, float]) -> None:
     assert ENDS @ found.velocity == pytest.approx(e, abs=1e-14)
     if e[0] == e[1]:
         assert np.array_equal(found.velocity, step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], e[0]).velocity)
-
-
-@pytest.mark.parametrize("e", [np.array([1.0, 0.0]), 0.97, 1.0])
-def test_a_bar_that_turns_does_not_gain(e: Any) -> None:
-    """One end falls at 1 m/s, the other rises at 0.1 m/s: Newton's step would make 0.015 J of nothing with e = 1."""
-    v = np.linalg.solve(ENDS, [-1.0, 0.1])
-    newton = stepping.nearest_velocity(BAR, v, ENDS, velocity_bounds(np.zeros(2), ENDS @ v, e, DT))
-    found = step(BAR, v, [0.0, 0.0], ENDS, [0.0, 0.0], e)
-    if np.ndim(e) == 0 and e == 1.0:
-        assert newton.impulse == pytest.approx([0.65, 0.3])
-        assert energy(newton.velocity) - energy(v) == pytest.approx(0.015)
-    assert energy(newton.velocity) > energy(v) * (1.0 + 1e-6)  # what is avoided
-    assert energy(found.velocity) <= energy(v) * (1.0 + 1e-14)
-    assert found.restitution_law == POISSON and (ENDS @ found.velocity).min() >= -1e-14
 
 
 def test_a_load_at_rest_is_not_thrown_by_rounding() -> None:
@@ -166,7 +143,7 @@ def test_steps_never_gain(equal: float | None, seed: int) -> None:
     root, rows, v = rng.normal(size=(d, d)), rng.normal(size=(c, d)), rng.normal(size=d)
     mass, e = root @ root.T + 0.1 * np.eye(d), rng.choice([0.0, 0.3, 1.0], size=c)
     found = step(mass, v, np.zeros(d), rows, np.zeros(c), e if equal is None else equal)
-    assert energy(found.velocity, mass) <= (1.0 + 1e-9) * energy(v, mass)
+    assert found.velocity @ mass @ found.velocity <= (1.0 + 1e-9) * (v @ mass @ v)
     assert (rows @ found.velocity).min() >= -1e-8 * np.abs(rows).max() * np.abs(v).max() * d
 
 
@@ -258,12 +235,6 @@ def test_contacts_without_a_common_body_are_solved_apart() -> None:
     assert (normal > 0.0).any()
 
 
-@pytest.mark.parametrize("wrong", [{"scheme": "euler"}, {"friction": "viscous"}])
-def test_unknown_schemes_and_friction_laws_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(ArgumentError, match=next(iter(wrong))):
-        RigidConstraints(**wrong)
-
-
 def test_the_parts_of_a_step_add_up_to_the_change_of_momentum_and_the_peg_comes_to_rest() -> None:
     system = System(load_scene(find_scene("peg_corner")))
     state, force, dt, law = system.make_state(), np.array([-3.2, 4.0, 0.0]), 1.0 / 512, RigidConstraints()
@@ -279,20 +250,6 @@ def test_the_parts_of_a_step_add_up_to_the_change_of_momentum_and_the_peg_comes_
         deepest = min(deepest, state.contacts.gap[: state.contact_count[0]].min(initial=0.0))
     assert states == {FREE, COLLIDING, RESTING} and deepest >= -1e-4  # corners turn while they touch
     assert np.abs(state.v).max() <= 1e-9 and np.abs(result.penalty_force + force).max() <= 1e-6
-
-
-def test_an_elastic_peg_keeps_its_energy_over_many_bounces() -> None:
-    scene = load_scene(find_scene("peg_corner")).with_values({"contact.restitution": 1.0})
-    system = System(scene)
-    state, law = system.make_state(), RigidConstraints(margin=0.0)
-    state.v[:] = [-0.4, 0.5, 1.0]
-    mass, bounces = mechanics_of(system).mass_matrix(state.q), 0
-    energy = state.v @ mass @ state.v
-    for _ in range(300):
-        result = law.advance(system, state, np.zeros(3), 1.0 / 512)
-        state.q[:], state.v[:] = result.q, result.v
-        bounces += result.state == COLLIDING
-    assert bounces >= 2 and state.v @ mass @ state.v == pytest.approx(energy, rel=1e-13)
 
 
 def test_the_bar_on_two_posts_gains_nothing_and_follows_the_law_of_the_scheme() -> None:

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from verification.clock import Times, sampler, seconds, take_turns
+from verification.clock import sampler, seconds, take_turns
 from verification.finding import Failure
-
-
-def test_statistics_are_of_the_samples_and_nan_of_none() -> None:
-    times = Times((3.0, 1.0, 2.0, 5.0, 4.0))
-    assert (times.least, times.lower, times.median, times.upper, times.largest) == (1.0, 2.0, 3.0, 4.0, 5.0)
-    assert times.over(Times((1.0, 1.0, 4.0, 5.0, 2.0))).samples == (3.0, 1.0, 0.5, 1.0, 2.0)
-    assert np.isnan(Times().median) and Times().rounds == 0
 
 
 def test_contestants_take_turns_in_an_order_that_changes_and_the_first_round_does_not_count() -> None:

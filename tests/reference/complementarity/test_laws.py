@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from reference.complementarity import ImpactProblem, laws
 from reference.complementarity.laws import newton_equality, newton_lcp, poisson
 from reference.complementarity.solvers import qp
 from reference.event_driven import LinearSystem, event_driven
-from reference.exact import bulk_energy_gain, exact_impact
+from reference.exact import bulk_energy_gain
 from reference.rigid_step import STEP_SOLVERS, nearest_velocity
 
 BAR = np.diag([1.0, 1.0 / 12.0])  # a bar struck at x = 0.5 and 0.4 (design of the counterexample)
@@ -35,19 +34,6 @@ def random_problem(seed: int, contacts: int, e: object) -> ImpactProblem:
 
 def gain(problem: ImpactProblem, v_plus: np.ndarray) -> float:
     return float(bulk_energy_gain(problem.mass_matrix, problem.velocity, v_plus)[0][0])
-
-
-@given(st.integers(0, 100_000), st.floats(0.0, 1.0))
-def test_one_contact_all_laws_agree(seed: int, e: float) -> None:
-    """C05: for one approaching contact the equality and both complementarity laws are the same law."""
-    problem = random_problem(seed, 1, e)
-    truth = exact_impact(problem.mass_matrix, problem.contact_jacobian, problem.velocity, Fraction(e))
-    kinetic = np.linalg.cholesky(problem.mass_matrix).T
-    size = np.linalg.norm(kinetic @ problem.velocity)
-    for law in (newton_equality, newton_lcp, poisson):
-        v_plus = law(problem).velocity
-        assert np.linalg.norm(kinetic @ (v_plus - truth.rounded_velocity)) <= 1e-12 * size
-        assert law(problem).impulse[0] >= 0.0
 
 
 @given(st.integers(0, 100_000), st.floats(0.0, 1.0))

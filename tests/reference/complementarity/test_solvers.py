@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from iapb.errors import ArgumentError, MissingDependencyError, SolverError
 from reference import siconos_bridge as siconos
 from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, solver_names
-from reference.complementarity.benchmark import performance_profile, run_solvers
+from reference.complementarity.benchmark import run_solvers
 from reference.complementarity.solution import project_on_cone
 from reference.complementarity.solvers import SolverEntry
 from reference.complementarity.solvers.enumeration import all_solutions
@@ -148,12 +148,6 @@ def test_refusals(call: Callable[[], Any], says: str) -> None:
         call()
 
 
-def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(SOLVERS, "absent", SolverEntry("nowhere", "not_a_package", "", "lcp"))
-    with pytest.raises(MissingDependencyError, match="pip install not_a_package"):
-        solve(LCP([[1.0]], [0.0]), "absent")
-
-
 @pytest.mark.parametrize("python", ["/nowhere/python3", "/bin/false"])
 def test_without_siconos_the_error_says_how_to_install_it(python: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """No such Python, and one that ends without Siconos."""
@@ -185,6 +179,7 @@ def test_siconos_answers_as_we_do_and_a_dead_process_is_a_failed_solve(monkeypat
     assert solve(skew, "siconos_lemke").solved()
 
 
+@pytest.mark.thorough
 def test_processes_that_import_quantecon_for_the_first_time_at_once_do_not_spoil_its_cache(tmp_path: Path) -> None:
     """Without `import_alone`'s lock some of them abort, and so does every later import, most of the time.
 
@@ -225,19 +220,6 @@ def test_every_pair_has_a_verdict_and_velocities_agree(monkeypatch: pytest.Monke
     missing = [row for row in rows if row.solver == "absent"]
     assert all(row.verdict == "missing" and "pip install" in row.note and row.residuals.worst == np.inf
                for row in missing) and len(missing) == 2  # fmt: skip
-
-
-def test_a_slow_solver_is_left_out_of_the_next_problems() -> None:
-    slow: dict[str, float] = {}
-    rows = run_solvers([STACK, STACK], ["daqp"], longest=0.0, slow=slow)
-    assert [row.verdict for row in rows] == ["solved", "left out"] and list(slow) == ["daqp"]
-
-
-def test_profile_counts_only_what_was_solved() -> None:
-    unsolvable = ImpactProblem.from_delassus([[0.0]], [-1.0], name="unsolvable")
-    profile = performance_profile(run_solvers([STACK, unsolvable], ["daqp", "enumeration"]), np.array([1.0, 1e12]))
-    assert {name: shares[-1] for name, shares in profile.items()} == {"daqp": 0.5, "enumeration": 0.5}
-    assert sum(shares[0] for shares in profile.values()) == 0.5  # one solver is the fastest on the one problem
 
 
 PROBLEMS = Path(__file__).parents[4] / "shared" / "problems"
@@ -308,13 +290,13 @@ def test_projection_obeys_moreau(x: list[float], mu: float) -> None:
 
 
 # --- joints beside contacts with friction (mixed problems) ---------------------------------------------------------
-def welded_masses(v: list[list[float]], e: float, mu: float, planar: bool = True) -> ImpactProblem:
+def welded_masses(v: list[list[float]], mu: float, planar: bool) -> ImpactProblem:
     """Masses of 1 and 2 kg, welded to one another; the second strikes the floor. Frames (normal, tangents)."""
     d = 2 if planar else 3
     joint, floor = np.hstack([np.eye(d), -np.eye(d)]), np.hstack([np.zeros((d, d)), np.eye(d)])
     mass = np.diag([1.0] * d + [2.0] * d)
     velocity = np.array(v)[:, :d].ravel()
-    return ImpactProblem.from_impact(mass, np.vstack([joint, floor]), velocity, e, mu, contact_size=d,
+    return ImpactProblem.from_impact(mass, np.vstack([joint, floor]), velocity, 0.0, mu, contact_size=d,
                                      bilateral=[True, False])  # fmt: skip
 
 
@@ -323,25 +305,15 @@ def welded_masses(v: list[list[float]], e: float, mu: float, planar: bool = True
 def test_joints_and_friction_by_hand(solver: str, planar: bool) -> None:
     """The weld makes 3 kg with (−1/3, 1, 0) m/s of (−1, 3, 0) and none: p_n = 1 N s, and friction takes at most μ."""
     struck = [[-1.0, 3.0, 0.0], [0.0, 0.0, 0.0]]
-    slides = solve(welded_masses(struck, 0.0, 0.5, planar), solver)
-    sticks = solve(welded_masses(struck, 0.0, 4.0, planar), solver)
+    slides = solve(welded_masses(struck, 0.5, planar), solver)
+    sticks = solve(welded_masses(struck, 4.0, planar), solver)
     d = 2 if planar else 3
     assert slides.solved(1e-8), (slides.note, slides.residuals)
     assert slides.velocity_plus.reshape(2, d)[:, :2] == pytest.approx(np.array([[0.0, 5 / 6]] * 2), abs=1e-8)
     assert slides.answer().reshape(2, d)[:, :2] == pytest.approx(np.array([[1.0, -13 / 6], [1.0, -0.5]]), abs=1e-7)
     assert sticks.solved(1e-8) and np.abs(sticks.velocity_plus).max() <= 1e-8
+    assert not Solution(slides.problem, np.zeros(2 * d)).solved(1e-3)
     assert sticks.answer().reshape(2, d)[:, :2] == pytest.approx(np.array([[1.0, -3.0], [1.0, -3.0]]), abs=1e-7)
-
-
-@pytest.mark.parametrize("solver", JOINT_SOLVERS)
-def test_contacts_bounce_and_joints_do_not(solver: str) -> None:
-    """Both fall at 1 m/s, e = 1/2: both rise with 1/2; the weld carries 3/2 N s for the mass above."""
-    falls = solve(welded_masses([[-1.0, 0.0], [-1.0, 0.0]], 0.5, 0.3), solver)
-    assert falls.solved(1e-8)
-    assert falls.velocity_plus == pytest.approx([0.5, 0.0, 0.5, 0.0], abs=1e-8)
-    assert falls.answer() == pytest.approx([1.5, 0.0, 4.5, 0.0], abs=1e-7)
-    assert not Solution(falls.problem, np.array([1.5, 0.1, 4.5, 0.0])).solved(1e-3)  # planted: the joint slips
-    assert not Solution(falls.problem, np.zeros(4)).solved(1e-3)
 
 
 @pytest.mark.parametrize("relaxed", [True, False])

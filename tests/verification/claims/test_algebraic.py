@@ -65,14 +65,3 @@ def test_instances_repeat_and_have_the_rank_they_say():
         assert np.array_equal(one.mass_matrix, other.mass_matrix)
         assert np.linalg.matrix_rank(one.contact_jacobian) == one.rank == 4
         assert np.linalg.cond(one.mass_matrix) == pytest.approx(1e4, rel=1e-6)
-
-
-def test_exact_pseudo_inverse_keeps_penrose_conditions():
-    from reference.exact import rational_matrix
-
-    rng = np.random.default_rng(3)
-    rows = rng.integers(-3, 4, (4, 2)).astype(float)
-    w = rational_matrix("w", rows @ rows.T)
-    inverse = algebraic.pseudo_inverse(w)
-    assert w * inverse * w == w and inverse * w * inverse == inverse
-    assert all(each.transpose() == each for each in (w * inverse, inverse * w))

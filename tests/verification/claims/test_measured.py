@@ -39,12 +39,6 @@ def test_a_coherence_distance_above_speed_times_step_must_also_reach_the_next_fa
     assert short < 1.0 < far
 
 
-def test_a_ball_that_bounces_off_the_facets_and_returns_collides_falsely():
-    table = CLAIMS["C18"].table(Study(), [Socket(9, 1000.0, 10.0, 4.0, 6.0)])
-    assert table.holds == (False,) and table["false collisions"][0] >= table["collisions on return"][0] > 0
-    assert table["reach"][0] > 1.0
-
-
 def test_a_range_of_sizes_is_confirmed_by_sizes_that_were_not_tried():
     fresh = [case.contacts for case in _fresh_impacts(Study(), SimpleNamespace(ends=lambda *_: (1, 200)))]
     assert fresh and not set(fresh) & set(SIZES)

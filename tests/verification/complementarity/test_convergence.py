@@ -14,18 +14,9 @@ from iapb.system import System
 from reference.scene_events import COMPUTATIONS, scene_truth
 from reference.time_stepping import RigidConstraints
 from verification.check import Study
-from verification.complementarity import convergence
-from verification.complementarity.convergence import (
-    CASES,
-    CONVERGENCE,
-    TRUTH_SCENES,
-    WITHOUT_TRUTH,
-    TruthCase,
-    converge,
-    scene_of,
-)
+from verification.complementarity import convergence as study
 
-BY_SCENE = {case.scene: case for case in CASES}
+BY_SCENE = {case.scene: case for case in study.CASES}
 EVENTS = {
     "two_link_arm_a": 1, "peg_corner": 3, "peg_hole": 1, "bernoulli_balls": 1, "arm_pushing": 1,
     "ball_dropped_in_space": 1, "box_dropped_in_space": 2, "cradle_in_space": 2, "arm_meets_a_wall_in_space": 1,
@@ -34,7 +25,7 @@ EVENTS = {
 
 @pytest.mark.parametrize("scene", EVENTS)
 def test_the_rigid_world_converges_at_first_order(scene: str) -> None:
-    table = CONVERGENCE.table(Study(), [BY_SCENE[scene]])
+    table = study.CONVERGENCE.table(Study(), [BY_SCENE[scene]])
     coarse, fine = table.records()
     assert fine["events"] == EVENTS[scene] and table.holds == (None, True)
     assert fine["order, positions"] > 0.6 and fine["order, velocities"] > 0.6 and coarse["step"] > 3.9 * fine["step"]
@@ -50,13 +41,13 @@ class _Halved(RigidConstraints):
         return result._replace(v=0.5 * (before + result.v))
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.scene)
-def test_a_truth_does_not_depend_on_rounding(case: TruthCase) -> None:
+@pytest.mark.parametrize("case", study.CASES, ids=lambda case: case.scene)
+def test_a_truth_does_not_depend_on_rounding(case: study.TruthCase) -> None:
     """Starts that differ by 1e-14 to 1e-12 have the same events and stay within the bound that the truth states.
 
     With the contacts' forces taken one by one, these starts gave bernoulli_balls 1, 6 or more than 60 events.
     """
-    scene = scene_of(case.scene)
+    scene = study.scene_of(case.scene)
     truth, start = scene_truth(scene, case.duration, case.coupled), System(scene).make_state()
     time = np.linspace(0.0, case.duration, 101)
     rng = np.random.default_rng(0)
@@ -71,16 +62,16 @@ def test_a_truth_does_not_depend_on_rounding(case: TruthCase) -> None:
 def test_a_truth_that_is_not_known_well_enough_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     found = scene_truth(load_scene(find_scene("two_discs")), 0.2)
     vague = replace(found, bound=found.bound._replace(position=1e-4))
-    monkeypatch.setattr(convergence, "scene_truth", lambda *_: vague)
+    monkeypatch.setattr(study, "scene_truth", lambda *_: vague)
     with pytest.raises(SolverError, match="its error is 1.0e-04"):
-        converge(BY_SCENE["two_discs"])
+        study.converge(BY_SCENE["two_discs"])
 
 
 def test_a_wrong_law_does_not_converge() -> None:
-    assert not converge(TruthCase("peg_corner", 0.36, True, ""), law=_Halved())[1]["holds"]
+    assert not study.converge(study.TruthCase("peg_corner", 0.36, True, ""), law=_Halved())[1]["holds"]
 
 
 def test_every_scene_of_the_project_has_a_truth_or_a_reason() -> None:
-    assert (set(BY_SCENE) | set(WITHOUT_TRUTH)) - set(TRUTH_SCENES) == set(scene_names())
-    assert set(TRUTH_SCENES) <= set(BY_SCENE)
-    assert not set(BY_SCENE) & set(WITHOUT_TRUTH)
+    assert (set(BY_SCENE) | set(study.WITHOUT_TRUTH)) - set(study.TRUTH_SCENES) == set(scene_names())
+    assert set(study.TRUTH_SCENES) <= set(BY_SCENE)
+    assert not set(BY_SCENE) & set(study.WITHOUT_TRUTH)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -118,16 +117,3 @@ def test_a_bounded_call_gives_the_same_answer() -> None:
     assert bounded.rank == here["rank"]
     assert here["outcome"] == STABLE
     assert np.allclose(bounded.velocity, [float(x) for x in case.truth.velocity], rtol=1e-12)
-
-
-def test_a_world_that_makes_energy_is_seen() -> None:
-    """A planted fault: the run of a wall whose velocities grow by a thousandth in each step."""
-    case = HARD_CASES["wall_at_the_bound"]()
-
-    def faulty(scene: object, world: str) -> object:
-        run = judge.run_in_world(case.scene, world)
-        growing = run.energy["kinetic"] * 1.001 ** np.arange(run.steps + 1)
-        return replace(run, energy={**run.energy, "kinetic": growing})
-
-    assert judged(case, "PB")["outcome"] == STABLE
-    assert judged(case, "PB", faulty)["outcome"] == "gains energy"  # type: ignore[arg-type]

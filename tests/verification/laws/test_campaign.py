@@ -7,23 +7,13 @@ import pytest
 
 from iapb import resolve_impact
 from verification.impacts import Floats, ImpactCase
+from verification.laws import campaign as study
 from verification.laws.bounds import FACTORED, KIT
-from verification.laws.campaign import (
-    IMPACTS,
-    OF_ONE_CALL,
-    ONE_IN,
-    UNEQUAL,
-    Batch,
-    Subject,
-    do_batch,
-    drawn,
-    tried_laws,
-)
 from verification.laws.equality import LAWS, UNEQUAL_LAWS
 from verification.laws.planted import wrong_sign
 from verification.laws.resolver import own_outcome, sound_resolver
 
-SUBJECT = Subject(sound_resolver, KIT, 1e8)
+SUBJECT = study.Subject(sound_resolver, KIT, 1e8)
 
 
 def test_the_laws_of_one_call_ask_once_and_keep_a_copy() -> None:
@@ -34,27 +24,27 @@ def test_the_laws_of_one_call_ask_once_and_keep_a_copy() -> None:
         answers.append(sound_resolver(M, J, v, e))
         return answers[-1]
 
-    for name in OF_ONE_CALL:
+    for name in study.OF_ONE_CALL:
         assert LAWS[name].check(case, counting, KIT).passed
     assert len(answers) == 1
     answers[0][:] = 7.0
     assert own_outcome(counting, case)[0] == 0.5 != own_outcome(wrong_sign, case)[0]
 
 
-@pytest.mark.parametrize(("part", "laws"), [(IMPACTS, LAWS), (UNEQUAL, UNEQUAL_LAWS)])
+@pytest.mark.parametrize(("part", "laws"), [(study.IMPACTS, LAWS), (study.UNEQUAL, UNEQUAL_LAWS)])
 def test_every_law_has_its_part_of_the_impacts(part: str, laws: dict[str, object]) -> None:
     cases = 5000
-    tried = [frozenset(tried_laws(part, index)) for index in range(cases)]
+    tried = [frozenset(study.tried_laws(part, index)) for index in range(cases)]
     for name in laws:
         count = sum(name in one for one in tried)
-        if name.removeprefix("unequal_") in OF_ONE_CALL:
+        if name.removeprefix("unequal_") in study.OF_ONE_CALL:
             assert count == cases
         else:  # five standard deviations of a fair draw
-            assert abs(count - cases / ONE_IN) < 5.0 * np.sqrt(cases / ONE_IN)
+            assert abs(count - cases / study.ONE_IN) < 5.0 * np.sqrt(cases / study.ONE_IN)
 
 
 def test_a_batch_counts_what_it_has_tried() -> None:
-    outcome = do_batch(Batch(IMPACTS, 0, 40), SUBJECT)
+    outcome = study.do_batch(study.Batch(study.IMPACTS, 0, 40), SUBJECT)
     counts = {count.law: count for count in outcome.counts}
     assert counts["kinetic_energy"].checked == counts["arguments"].checked == 40
     assert not any(count.failures for count in outcome.counts)
@@ -63,8 +53,8 @@ def test_a_batch_counts_what_it_has_tried() -> None:
 @pytest.mark.parametrize("index", [41452, 57210])
 def test_a_grazing_cradle_may_lose_an_impulse_below_rounding_in_another_frame(index: int) -> None:
     """Found by the long run: the clamp cuts an impulse of 1e-8 |u| that moves less energy than rounding does."""
-    engine = Subject(resolve_impact, FACTORED, 1e10)
-    case = drawn(UNEQUAL, index, engine)
+    engine = study.Subject(resolve_impact, FACTORED, 1e10)
+    case = study.drawn(study.UNEQUAL, index, engine)
     law = UNEQUAL_LAWS["unequal_momentum"].check
     residual = law(case, resolve_impact, FACTORED)
     assert residual is not None and residual.passed and 2.0 * np.sqrt(FACTORED.energy_gain(case)) < 1e-5

@@ -10,7 +10,7 @@ import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import ArgumentError
-from tests.verification.laws.faults import PUSHING, TOO_MUCH, newton, no_friction, returns_too_much
+from tests.verification.laws.faults import PUSHING, newton, no_friction, returns_too_much
 from verification import check_passivity
 from verification.impacts import ImpactCase
 from verification.laws import CONTRACTS, sound_resolver
@@ -62,12 +62,8 @@ def test_gains_in_real_arithmetic_are_graded() -> None:
     assert rounding.failures > 0 and rounding.severe == 0
     grades = f"impacts break it (0 by more than rounding, {rounding.failures} within it)"
     assert f"{rounding.failures} of {rounding.checked} {grades}" in str(rounding)
-    report = check_passivity(returns_too_much, **exact)
-    graded = report.verdict("exact_energy")
+    graded = check_passivity(returns_too_much, **exact).verdict("exact_energy")
     assert 0 < graded.severe <= graded.failures
-    assert graded.largest == pytest.approx(float(2 * TOO_MUCH * (2 * TOO_MUCH - 2)), rel=1e-12)
-    with pytest.raises(AssertionError, match="exact_energy"):
-        exec(report.counterexample_test + "\n\ntest_exact_energy()", {})
 
 
 @pytest.mark.parametrize(("options", "message"), [

@@ -15,7 +15,7 @@ from iapb import resolve_impact
 from tests.verification.laws.faults import moreau, newton, poisson
 from verification import check_passivity
 from verification.impacts import draw_frictional_case, draw_wide_case
-from verification.laws import CONTRACTS, LAWS, sound_resolver
+from verification.laws import LAWS, sound_resolver
 from verification.laws.bounds import KIT
 from verification.laws.contracts import distance_from_cone
 
@@ -40,7 +40,8 @@ SOUND: dict[str, tuple[str, Callable[..., Any]]] = {
 @pytest.mark.parametrize("name", SOUND)
 def test_a_sound_resolver_passes_at_every_seed(name: str, seed: int) -> None:
     contract, resolver = SOUND[name]
-    report = check_passivity(resolver, contract=contract, impacts=IMPACTS, seed=seed, search=0, patience=np.inf)
+    report = check_passivity(resolver, contract=contract, impacts=IMPACTS, seed=seed, search=0, patience=np.inf,
+                             unequal_restitution=name == "iapb")
     assert report.passed and all(verdict.checked > 0 for verdict in report.verdicts), report
     assert report.counterexample is None and report.counterexample_test == "" and report.worst.worst.ratio <= 1.0
 
@@ -52,18 +53,6 @@ def test_many_dependent_rows_may_be_reduced_to_any_of_them() -> None:
     assert (case.coordinates, case.contacts, len(case.row_space)) == (26, 409, 19)
     residual = LAWS["groups"].check(case, resolve_impact, KIT)
     assert residual.value <= 0.01 * residual.tolerance < 1e-9
-
-
-@pytest.mark.parametrize(("seed", "number"), [(0, 879), (1, 466)])
-def test_impacts_with_friction_have_an_answer_that_sweeps_reach(seed: int, number: int) -> None:
-    """As drawn before, sweeps had not ended after 20,000 (seed 0), and the search of the cone at 1.7e-7 (seed 1)."""
-    rng = np.random.default_rng(seed)
-    for k in range(number + 1):
-        case = draw_frictional_case(rng, k)
-        if k > number - 40:
-            for law in ("cone", "no_penetration", "restitution"):
-                residual = CONTRACTS["frictional"].laws[law].check(case, moreau, CONTRACTS["frictional"].bounds)
-                assert residual is None or residual.passed, residual
 
 
 def test_the_distance_from_the_cone_of_two_sliding_contacts_on_dependent_rows_is_zero() -> None:

@@ -8,30 +8,24 @@ import pytest
 from reference.worlds import run_world
 from verification.check import Study
 from verification.finding import MIXED, REFUTED, REPRODUCED
-from verification.mechanics.false_collisions import (
-    FALSE_COLLISIONS,
-    SETTINGS,
-    filters,
-    found_with,
-    socket,
-)
+from verification.mechanics import false_collisions as study
 from verification.scenes.books import OPEN, open_row
 
 
 def test_coherence_removes_every_false_collision_and_clustering_the_doubled_contacts() -> None:
-    neither, coherence, clustering, both = (found_with(Study(), (name, 40.0)) for name in SETTINGS)
+    neither, coherence, clustering, both = (study.found_with(Study(), (name, 40.0)) for name in study.SETTINGS)
     assert neither["false collisions"] >= 10 and neither["energy lost, share of the fall"] > 0.2
     assert both["false collisions"] == coherence["false collisions"] == 0
     assert both["doubled contacts"] == clustering["doubled contacts"] == 0 < coherence["doubled contacts"]
     # with clustering alone the one contact left at an edge jumps from facet to facet: new each time
     assert clustering["false collisions"] >= neither["false collisions"]
     # a ball that bounces off the edges comes back as new, because coherence looks one step back
-    assert found_with(Study(), ("both filters", 10.0))["false collisions"] > 0
+    assert study.found_with(Study(), ("both filters", 10.0))["false collisions"] > 0
 
 
 def explicit_rates(contact: dict[str, float], rate: float | None = None) -> tuple[float, float]:
     """B T / m, and μ F_n T / (v_threshold m_t) with the largest F_n of the run: what a held force may reach."""
-    scene = socket(contact, rate)
+    scene = study.socket(contact, rate)
     run, ball = run_world(scene, "IAPB"), scene.bodies[0]
     felt = 1.0 / (1.0 / ball.mass + ball.shapes[0].radius ** 2 / ball.inertia)
     pressed = float(np.max(run.contacts.normal_force))
@@ -42,7 +36,7 @@ def explicit_rates(contact: dict[str, float], rate: float | None = None) -> tupl
 def test_the_scene_is_slow_enough_for_its_step_and_its_books_show_it() -> None:
     damper, friction = explicit_rates({})
     assert damper < 0.2 and friction < 1.0
-    row = open_row(socket({}), lambda scene: run_world(scene, "IAPB"), (1, 2))
+    row = open_row(study.socket({}), lambda scene: run_world(scene, "IAPB"), (1, 2))
     assert row[f"{OPEN} [%]"] < 5.0
     assert row["order measured"] == pytest.approx(1.0, abs=0.15)  # semi-implicit Euler's, as declared
 
@@ -51,7 +45,7 @@ def test_at_a_haptic_step_and_a_sharp_threshold_friction_chatters_and_a_quarter_
     sharp = {"friction_velocity": 1e-2}
     damper, friction = explicit_rates(sharp, 1000.0)
     assert damper == pytest.approx(0.4) and friction > 2.0
-    row = open_row(socket(sharp, 1000.0), lambda scene: run_world(scene, "IAPB"), (1,))
+    row = open_row(study.socket(sharp, 1000.0), lambda scene: run_world(scene, "IAPB"), (1,))
     assert row[f"{OPEN} [%]"] > 20.0
 
 
@@ -61,6 +55,6 @@ def test_at_a_haptic_step_and_a_sharp_threshold_friction_chatters_and_a_quarter_
 )
 def test_false_collisions_are_judged_by_what_both_filters_leave(left, outcome) -> None:
     rows = [{"filters": name, "damping [N s/m]": damping, "false collisions": kept if name == "both filters" else 20}
-            for damping, kept in left.items() for name in SETTINGS]  # fmt: skip
-    said = filters(FALSE_COLLISIONS.table_of(rows))
+            for damping, kept in left.items() for name in study.SETTINGS]  # fmt: skip
+    said = study.filters(study.FALSE_COLLISIONS.table_of(rows))
     assert said.verdict == outcome and bool(said.miss) == (outcome != REPRODUCED)

@@ -12,7 +12,6 @@ from verification.mechanics import tumbling
 
 H = 1e-4  # [s] of central differences: their error is about H^2
 BODIES = tumbling.MOTIONS.values()
-EXPLICIT = [one for one in INTEGRATORS.values() if not one.conserving]  # `momentum` has its Coriolis terms in kernels
 
 
 @pytest.mark.parametrize("body", BODIES, ids=tumbling.MOTIONS)
@@ -34,26 +33,6 @@ def test_every_integrator_keeps_its_order_on_rotations(method):
     assert rows[-1]["order"] == pytest.approx(method.group_order, abs=tumbling.ORDER_TOLERANCE)
     assert min(rows[-1][name] or np.inf for name in tumbling.DRIFT_ORDERS) > (
         method.group_order - tumbling.ORDER_TOLERANCE)
-
-
-POLYNOMIALS = {  # of h A in q' = v, v' = K q: one step is exp(h A) up to the method's order
-    "midpoint": lambda a: np.eye(6) + a + a @ a / 2.0,
-    "runge_kutta_4": lambda a: np.eye(6) + a + a @ a / 2.0 + a @ a @ a / 6.0 + a @ a @ a @ a / 24.0,
-    "semi_implicit_euler": lambda a: (np.eye(6) + np.pad(a[:3, 3:], ((0, 3), (3, 0)))) @ (
-        np.eye(6) + np.pad(a[3:], ((3, 0), (0, 0)))),
-}
-
-
-@pytest.mark.parametrize("method", EXPLICIT, ids=lambda method: method.name)
-def test_a_step_of_a_linear_system_is_the_methods_polynomial(method):
-    """Damped springs, q'' = K q + D v: the stability function as a matrix."""
-    rng = np.random.default_rng(0)
-    stiffness, damping = rng.normal(size=(2, 3, 3))
-    q, v, h = rng.normal(size=3), rng.normal(size=3), 0.3
-    a = h * np.block([[np.zeros((3, 3)), np.eye(3)], [stiffness, damping]])
-    found = method.step(lambda q, v, dt: q + dt * v, lambda q, v: stiffness @ q + damping @ v, q, v, h)
-    expected = POLYNOMIALS[method.name](a) @ np.concatenate((q, v))
-    np.testing.assert_allclose(np.concatenate(found), expected, rtol=0.0, atol=1e-14)
 
 
 def test_a_body_of_another_shape_does_not_converge():

@@ -13,29 +13,19 @@ from iapb.advice.certificate import EXPORT_HEAD, exported, judge_gains
 from iapb.errors import IapbError
 from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED
 from verification.proofs import all_proofs, coq_development, on_proofs
-from verification.proofs.coq_development import (
-    FOLDER,
-    NO_ANSWER,
-    NOT_RUN,
-    STATEMENTS,
-    Theorem,
-    compiled,
-    files,
-    lacking,
-    theorems,
-)
+from verification.proofs import coq_development as coq
 from verification.proofs.show import YES
 
 IMPACTS = 1_500  # a hundred thousand were judged alike once: see docs/report.md
 needs_ocaml = pytest.mark.skipif(
-    bool(lacking("Checker")) or shutil.which("ocamlopt") is None, reason="coqc or ocamlopt is not installed")
+    bool(coq.lacking("Checker")) or shutil.which("ocamlopt") is None, reason="coqc or ocamlopt is not installed")
 
 
 @pytest.fixture(scope="module")
 def checker(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("checker")
-    compiled("Checker", folder)
-    shutil.copy(FOLDER / "checker.ml", folder)
+    coq.compiled("Checker", folder)
+    shutil.copy(coq.FOLDER / "checker.ml", folder)
     subprocess.run(["ocamlopt", "judge.mli", "judge.ml", "checker.ml", "-o", "checker"], cwd=folder, check=True)
     return folder / "checker"
 
@@ -104,15 +94,15 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", files())
+@pytest.mark.parametrize("name", coq.files())
 def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, built: Path) -> None:
-    source = (FOLDER / f"{name}.v").read_text(encoding="utf-8")
+    source = (coq.FOLDER / f"{name}.v").read_text(encoding="utf-8")
     assert not any(word in source for word in ("Admitted", "admit.", "Axiom ", "Parameter ", "Abort"))
-    if reason := lacking(name):
+    if reason := coq.lacking(name):
         pytest.skip(reason)
-    found = compiled(name, built)
+    found = coq.compiled(name, built)
     assert found and all(theorem.holds for theorem in found), found
-    if name == STATEMENTS:
+    if name == coq.STATEMENTS:
         assert {theorem.name for theorem in found} < set(all_proofs())
     else:
         assert all(theorem.says for theorem in found)  # about the code: each has its English
@@ -122,53 +112,53 @@ def test_coq_accepts_the_development_and_assumes_the_reals_alone(name: str, buil
     ("(one - e * e) * form", "(one - e) * form"), ("opp (e * J * v)", "e * J * v"), ("W * G * W = W", "W * G * W = G")])
 def test_coq_refuses_a_corrupted_statement(now: str, then: str, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
-    if reason := lacking(STATEMENTS):
+    if reason := coq.lacking(coq.STATEMENTS):
         pytest.skip(reason)
-    source = (FOLDER / f"{STATEMENTS}.v").read_text(encoding="utf-8")
+    source = (coq.FOLDER / f"{coq.STATEMENTS}.v").read_text(encoding="utf-8")
     assert now in source
     (tmp_path / "out").mkdir()
-    (tmp_path / f"{STATEMENTS}.v").write_text(source.replace(now, then), encoding="utf-8")
+    (tmp_path / f"{coq.STATEMENTS}.v").write_text(source.replace(now, then), encoding="utf-8")
     monkeypatch.setattr(coq_development, "FOLDER", tmp_path)
     with pytest.raises(IapbError, match="Theorems.v.*Error"):
-        compiled(STATEMENTS, tmp_path / "out")
+        coq.compiled(coq.STATEMENTS, tmp_path / "out")
 
 
 def test_an_axiom_of_ones_own_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if reason := lacking("Checker"):
+    if reason := coq.lacking("Checker"):
         pytest.skip(reason)
     (tmp_path / "Wrong.v").write_text(
         "Axiom easy : forall n : nat, n = 0.\nTheorem all : 1 = 0.\nProof. apply easy. Qed.\nPrint Assumptions all.\n")
     (tmp_path / "Open.v").write_text("Theorem all : 1 = 0.\nProof. reflexivity. Qed.\nPrint Assumptions all.\n")
     (folder := tmp_path / "out").mkdir()
     monkeypatch.setattr(coq_development, "FOLDER", tmp_path)
-    (theorem,) = compiled("Wrong", folder)
-    assert theorem == Theorem("all", YES, ("easy",)) and theorem.holds is False
+    (theorem,) = coq.compiled("Wrong", folder)
+    assert theorem == coq.Theorem("all", YES, ("easy",)) and theorem.holds is False
     with pytest.raises(IapbError, match="Unable to unify"):
-        compiled("Open", folder)
+        coq.compiled("Open", folder)
 
 
 def test_coq_that_fails_refutes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A library that is not where this version of Coq looks for it, say: no answer, with Coq's own words."""
-    if reason := lacking("Checker"):
+    if reason := coq.lacking("Checker"):
         pytest.skip(reason)
     (tmp_path / "Moved.v").write_text(
         "From Coq Require Import NoSuchLibrary.\nTheorem all : 1 = 1.\nProof. trivial. Qed.\nPrint Assumptions all.\n")
     monkeypatch.setattr(coq_development, "FOLDER", tmp_path)
-    (theorem,) = theorems()
-    assert theorem.coq == NO_ANSWER and theorem.holds is None and "NoSuchLibrary" in theorem.error
+    (theorem,) = coq.theorems()
+    assert theorem.coq == coq.NO_ANSWER and theorem.holds is None and "NoSuchLibrary" in theorem.error
 
 
 def test_without_coq_nothing_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    found = theorems(lambda *done: None, [])
-    assert len(found) >= 6 and {theorem.coq for theorem in found} == {NOT_RUN}
+    found = coq.theorems(lambda *done: None, [])
+    assert len(found) >= 6 and {theorem.coq for theorem in found} == {coq.NOT_RUN}
     finding = on_proofs([], (), found)
     assert "not checked here" in finding.answer and len(finding.parts) == 1
 
 
 @pytest.mark.parametrize(("answer", "axioms", "verdict"), [
     (YES, ("Classical_Prop.classic",), REPRODUCED), (YES, ("easy",), REFUTED),
-    (NO_ANSWER, (), NOT_COMPUTED), (NOT_RUN, (), NOT_COMPUTED)])  # fmt: skip
+    (coq.NO_ANSWER, (), NOT_COMPUTED), (coq.NOT_RUN, (), NOT_COMPUTED)])  # fmt: skip
 def test_a_refused_theorem_or_a_strange_axiom_refutes(answer: str, axioms: tuple[str, ...], verdict: str) -> None:
-    finding = on_proofs([], (), [Theorem("check_sound", YES), Theorem("compensated", answer, axioms)])
+    finding = on_proofs([], (), [coq.Theorem("check_sound", YES), coq.Theorem("compensated", answer, axioms)])
     assert finding.parts[1].verdict == verdict

@@ -23,9 +23,7 @@ DROPPED = ""  # the whole hypothesis
 
 CORRUPTED = [
     ("theorem_1", "v⁺ = v − (1 + e)", "v⁺ = v + (1 + e)"),
-    ("theorem_1", "loss = (1 − e²) form", "loss = 2 (1 − e²) form"),
     ("theorem_1", "given   e ≤ 1", DROPPED),
-    ("theorem_2", "v⁺ = v − (1 + e)", "v⁺ = v − (1 − e)"),
     ("theorem_2", "J v⁺ = −e J v", "J v⁺ = e J v"),
     ("theorem_2", "given   M is positive definite", DROPPED),
     ("theorem_2", "given   G is a {1}-inverse", DROPPED),
@@ -39,9 +37,7 @@ CORRUPTED = [
     ("coordinate_invariance", "Mᵣ = Fᵀ M F", "Mᵣ = F⁻¹ M F"),
     ("scaled_impulse", "eₛ = s (1 + e) − 1", "eₛ = s (1 + e) + 1"),
     ("resting_contact", ":: k = K h + B", ":: k = K h − B"),
-    ("resting_contact", "taken = K (n² − n⁺²) − 2 h f γ", "taken = K (n² − n⁺²) − 4 h f γ"),
     ("resting_contact", "given   B ≥ 0", DROPPED),
-    ("resting_energy", ":: gained = 2 pᵀ J v⁺", ":: gained = pᵀ J v⁺"),
     ("resting_energy", "given   u ≥ 0", DROPPED),
     ("projector_form", "given   Qᵀ Q = I", DROPPED),
     ("spectral_filter", "sᵀ (I − E²) s ≥ 0", "sᵀ (E² − I) s ≥ 0"),

@@ -6,20 +6,7 @@ import numpy as np
 import pytest
 
 from verification.claims.conditions import Condition
-from verification.scenes.measures import (
-    Trace,
-    bounces,
-    comparison_window,
-    corner_gaps,
-    device_overlap,
-    force_distance,
-    peak_force,
-    root_mean_square,
-    separation_by_impacts,
-    settling_time,
-    settling_times,
-    unbalanced_force,
-)
+from verification.scenes import measures
 
 STEPS, DT = 100, 0.01
 
@@ -29,7 +16,7 @@ def trace(device=None, velocity=None, force=None, contact_at=10, tool=None):
     new = np.zeros(STEPS, bool)
     new[contact_at] = True
     device = states if device is None else device
-    return Trace(
+    return measures.Trace(
         np.arange(STEPS + 1) * DT, device, device if tool is None else tool, states if velocity is None else velocity,
         steps if force is None else force, steps + [-0.32, 0.4, 0.0], np.zeros(STEPS), new, np.array([contact_at]),
         np.array([1e-3]), np.array([1.0]), np.zeros(STEPS + 1),
@@ -48,29 +35,30 @@ UNTIL_50, FOREVER = column(np.arange(STEPS + 1) <= 50, 0), column(np.full(STEPS 
 def test_distances_are_taken_in_the_window():
     late = np.where(np.arange(STEPS + 1) >= 20, 2e-3, 0.0)
     ours, ideal = trace(device=column(late, 1)), trace()
-    assert root_mean_square(ours, ideal, slice(20, 60)) == pytest.approx([0.0, 2e-3, 0.0])
-    assert root_mean_square(ours, ideal, slice(0, 40)) == pytest.approx([0.0, 2e-3 / np.sqrt(2), 0.0])
+    assert measures.root_mean_square(ours, ideal, slice(20, 60)) == pytest.approx([0.0, 2e-3, 0.0])
+    assert measures.root_mean_square(ours, ideal, slice(0, 40)) == pytest.approx([0.0, 2e-3 / np.sqrt(2), 0.0])
 
 
 def test_window_goes_from_the_first_contact_to_the_last_settling():
-    window = comparison_window([trace(contact_at=12), trace(velocity=UNTIL_50, contact_at=15)])
+    window = measures.comparison_window([trace(contact_at=12), trace(velocity=UNTIL_50, contact_at=15)])
     assert (window.start, window.stop) == (12, 52)
-    assert comparison_window([trace(), trace(velocity=FOREVER)]).stop == STEPS + 1
+    assert measures.comparison_window([trace(), trace(velocity=FOREVER)]).stop == STEPS + 1
 
 
 def test_settling_counts_from_the_first_contact():
-    assert settling_time(trace(velocity=UNTIL_50, contact_at=10)) == pytest.approx(0.41)
-    assert settling_time(trace(velocity=FOREVER)) is None
+    assert measures.settling_time(trace(velocity=UNTIL_50, contact_at=10)) == pytest.approx(0.41)
+    assert measures.settling_time(trace(velocity=FOREVER)) is None
     slowing = trace(velocity=column(1e-3 * 2.0 ** (2.5 - np.arange(STEPS + 1) / 20), 0), contact_at=10)
-    assert settling_times(slowing) == pytest.approx([0.6, 0.4, 0.2])  # below 0.5, 1 and 2 mm/s
-    assert settling_times(trace(velocity=FOREVER)) == pytest.approx([0.9] * 3)
+    assert measures.settling_times(slowing) == pytest.approx([0.6, 0.4, 0.2])  # below 0.5, 1 and 2 mm/s
+    assert measures.settling_times(trace(velocity=FOREVER)) == pytest.approx([0.9] * 3)
 
 
 def test_a_spike_one_step_later_counts_by_its_impulse_and_not_by_its_square():
     early, late = column(np.eye(1, STEPS, 30)[0] * 60.0, 0), column(np.eye(1, STEPS, 31)[0] * 60.0, 0)
-    mean, rms = (force_distance(trace(force=late), trace(force=early), slice(0, STEPS), order)[0] for order in (1, 2))
+    mean, rms = (measures.force_distance(trace(force=late), trace(force=early), slice(0, STEPS), order)[0]
+                 for order in (1, 2))
     assert mean == pytest.approx(2 * 60.0 / STEPS) and rms == pytest.approx(60.0 * np.sqrt(2 / STEPS))
-    assert peak_force(trace(force=late))[0] == 60.0
+    assert measures.peak_force(trace(force=late))[0] == 60.0
 
 
 def test_balance_is_judged_in_contact_and_outside_collisions():
@@ -80,21 +68,21 @@ def test_balance_is_judged_in_contact_and_outside_collisions():
     force += column(5.0 * np.eye(1, STEPS, 60)[0], 0) + column(7.0 * np.eye(1, STEPS, 5)[0], 0)
     states = np.column_stack([x, np.full((STEPS + 1, 2), (-0.05, 0.0))])
     pushed = replace(trace(device=states, force=force), impact_step=np.array([30]))
-    assert unbalanced_force(pushed, slice(0, STEPS + 1)) == pytest.approx([5.0 / 79, 0.0, 0.0])
-    assert unbalanced_force(pushed, slice(0, 20)) == pytest.approx([0.0, 0.0, 0.0])
+    assert measures.unbalanced_force(pushed, slice(0, STEPS + 1)) == pytest.approx([5.0 / 79, 0.0, 0.0])
+    assert measures.unbalanced_force(pushed, slice(0, 20)) == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_impacts_separate_in_their_own_step_only():
     apart = column(np.where(np.arange(STEPS + 1) > 40, 3e-4, 0.0), 0)  # in step 40
     parted = trace(tool=apart, device=np.zeros_like(apart))
-    assert separation_by_impacts(parted).max() == 0.0
-    assert separation_by_impacts(replace(parted, impact_step=np.array([10, 40])))[0] == pytest.approx(3e-4)
+    assert measures.separation_by_impacts(parted).max() == 0.0
+    assert measures.separation_by_impacts(replace(parted, impact_step=np.array([10, 40])))[0] == pytest.approx(3e-4)
 
 
 def test_the_overlap_of_the_device_is_that_of_its_deepest_corner():
     away, inside = (np.tile([x, -0.05, 0.0], (STEPS + 1, 1)) for x in (0.05, 0.0100))  # 0.5 mm in the right wall
-    assert device_overlap(trace(device=inside, tool=away)) == pytest.approx(5e-4)
-    assert device_overlap(trace(device=away)) == 0.0
+    assert measures.device_overlap(trace(device=inside, tool=away)) == pytest.approx(5e-4)
+    assert measures.device_overlap(trace(device=away)) == 0.0
 
 
 @pytest.mark.parametrize(("heights", "count"), [
@@ -102,7 +90,7 @@ def test_the_overlap_of_the_device_is_that_of_its_deepest_corner():
     *((height * (np.arange(STEPS + 1) % 2), 0) for height in (0.0, 5e-6, -2e-4))])  # fmt: skip
 def test_a_hop_is_a_bounce_of_both_corners_flicker_and_overlap_are_none(heights, count):
     device = np.column_stack([np.full(STEPS + 1, 0.05), -0.00525 - heights, np.zeros(STEPS + 1)])
-    assert bounces(trace(device=device)) == count
+    assert measures.bounces(trace(device=device)) == count
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.2, -0.3])
@@ -110,6 +98,6 @@ def test_a_start_has_the_clearance_and_the_travel_it_says(tilt):
     from iapb import find_scene, load_scene
 
     placed = Condition(tilt, clearance=0.012, travel=0.007).place(load_scene(find_scene("peg_corner")))
-    gaps = [gap[0] for gap in corner_gaps(np.array([placed.bodies[0].position]))]
+    gaps = [gap[0] for gap in measures.corner_gaps(np.array([placed.bodies[0].position]))]
     assert min(gaps[0::2]) == pytest.approx(0.012)
     assert min(gaps[1::2]) == pytest.approx(0.007)

@@ -7,27 +7,17 @@ import pytest
 
 from verification.check import Study
 from verification.claims import CLAIMS
-from verification.stability.walls import (
-    GROWS,
-    IMPULSES,
-    LAWS,
-    PENALTY,
-    Loop,
-    _held_force,
-    grid,
-    maps_of,
-    touch_walls,
-)
+from verification.stability import walls as study
 
 
-def at(loop: Loop, stiffness: float, damping: float, law: str):  # type: ignore[no-untyped-def]
-    return touch_walls(loop, np.array([stiffness]), np.array([damping]), law)
+def at(loop: study.Loop, stiffness: float, damping: float, law: str):  # type: ignore[no-untyped-def]
+    return study.touch_walls(loop, np.array([stiffness]), np.array([damping]), law)
 
 
 @pytest.mark.parametrize("b", [0.0, 1e-9, 0.05, 5.0, 500.0])
 def test_motion_between_samples_is_that_of_the_differential_equation(b: float) -> None:
-    loop = Loop(device_damping=b)
-    free, moved, held = _held_force(loop)
+    loop = study.Loop(device_damping=b)
+    free, moved, held = study._held_force(loop)
     x, v, force, n = 0.3, -0.7, 1.1, 20_000
     fine_x, fine_v, h = x, v, loop.step / n
     for _ in range(n):  # midpoint rule, error h²
@@ -38,40 +28,41 @@ def test_motion_between_samples_is_that_of_the_differential_equation(b: float) -
     assert free * v + moved * a == pytest.approx(fine_v, abs=1e-10)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", study.LAWS)
 def test_a_stiff_undamped_wall_makes_the_hand_faster_and_a_soft_damped_one_holds(law: str) -> None:
-    assert at(Loop(), 1e6, 0.0, law).grown.all() and at(Loop(device_damping=5.0), 1000.0, 50.0, PENALTY).settled.all()
+    assert at(study.Loop(), 1e6, 0.0, law).grown.all()
+    assert at(study.Loop(device_damping=5.0), 1000.0, 50.0, study.PENALTY).settled.all()
 
 
 def test_stiff_walls_at_1_khz_bounce_on_below_the_speed_of_rest() -> None:
     """The report explains with this why such walls come to rest with impulses though nothing damps the motion."""
-    short, long = (at(Loop(rate=1000.0, seconds=seconds), 3e5, 0.0, IMPULSES) for seconds in (3.0, 12.0))
+    short, long = (at(study.Loop(rate=1000.0, seconds=seconds), 3e5, 0.0, study.IMPULSES) for seconds in (3.0, 12.0))
     assert short.settled.all() and long.settled.all() and (long.bounces > 3 * short.bounces).all()
 
 
 def test_a_plastic_impulse_stops_the_mass_on_touching() -> None:
-    loop = Loop(push=0.0)
-    contact = at(loop, 1000.0, 50.0, IMPULSES)
+    loop = study.Loop(push=0.0)
+    contact = at(loop, 1000.0, 50.0, study.IMPULSES)
     assert contact.penetration[0] <= 2.0 * loop.speed * loop.step
-    assert at(loop, 1000.0, 50.0, PENALTY).penetration[0] > 3.0 * contact.penetration[0]
+    assert at(loop, 1000.0, 50.0, study.PENALTY).penetration[0] > 3.0 * contact.penetration[0]
 
 
 def test_rate_hardness_of_an_impulse_does_not_know_the_wall() -> None:
     stiffness = np.array([100.0, 1e4])
-    hardness = touch_walls(Loop(), stiffness, np.array([50.0, 50.0]), IMPULSES).rate_hardness
+    hardness = study.touch_walls(study.Loop(), stiffness, np.array([50.0, 50.0]), study.IMPULSES).rate_hardness
     assert hardness[0] == pytest.approx(hardness[1], rel=1e-12)
-    theirs = touch_walls(Loop(), stiffness, np.array([50.0, 50.0]), PENALTY).rate_hardness
+    theirs = study.touch_walls(study.Loop(), stiffness, np.array([50.0, 50.0]), study.PENALTY).rate_hardness
     assert theirs[1] > theirs[0]
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", study.LAWS)
 def test_no_wall_within_the_condition_makes_the_hand_faster(law: str) -> None:
-    loop, (stiffness, damping) = Loop(device_damping=5.0), grid("quick")
-    outcomes = maps_of(loop, stiffness, damping)[LAWS.index(law)].outcomes
+    loop, (stiffness, damping) = study.Loop(device_damping=5.0), study.grid("quick")
+    outcomes = study.maps_of(loop, stiffness, damping)[study.LAWS.index(law)].outcomes
     passive = loop.passive_damping(stiffness) >= damping[:, None]
-    if law == PENALTY:
-        assert passive.any() and not (outcomes[passive] == GROWS).any()
-    assert (outcomes[~passive] == GROWS).any()
+    if law == study.PENALTY:
+        assert passive.any() and not (outcomes[passive] == study.GROWS).any()
+    assert (outcomes[~passive] == study.GROWS).any()
 
 
 def test_c20_holds_and_would_not_with_the_bound_in_the_wrong_place() -> None:

@@ -104,13 +104,6 @@ def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypa
     assert "the reference PB stopped" in compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0).answer
 
 
-def test_the_impulse_is_a_resultant_only_where_the_mass_matrix_is_constant():
-    short = {"duration": 0.002}
-    for scene, said in ((SLOPE, "resultant of all contacts"), (load_scene(HERE / "arm.yaml"), "no resultant")):
-        found = compare_worlds(scene.with_values(short), ["IAPB", "PB"], "IAPB", impacts=0)
-        assert said in found.details["impulse"] and said in found.tables["worlds"].note
-
-
 def wrong(problem):
     """A solver that is content with no impulse at all."""
     return Answer(np.zeros(problem.size), "done")
