@@ -22,7 +22,8 @@ run = simulate(scene_from_text(sys.stdin.read())); print(len(run.impacts.step), 
 """
 
 
-@pytest.mark.parametrize("name", ["one contact", pytest.param("several that rub", marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", SCENES)
 def test_a_scene_runs_alike_on_its_own_kernels_and_on_those_of_all(name: str) -> None:
     bodies, contact = SCENES[name]
     text = scene_of(bodies, [FLOOR], gravity=[0, -9.81], duration=0.4, contact=contact).source_text

@@ -50,8 +50,8 @@ NEEDS = [("from iapb import simulate; simulate('peg_corner', world='ideal', step
          ("from iapb import simulate; simulate('peg_corner', steps=5).save('never.h5')", "Run.save", "h5py"),
          ("from verification import check_passivity", "verification.check_passivity", "hypothesis"),
          ("from iapb.__main__ import main; print(main())", "iapb: The command", "typer")]
-COMMANDS = {"live peg_corner --view": ("viser", "report"), "inspect run.h5": ("h5py", "reference"),
-            "verify": ("hypothesis", "verify"), "reproduce": ("jinja2", "report"), "prove": ("sympy", "verify")}
+COMMANDS = {"inspect run.h5": ("h5py", "reference"),
+            "verify": ("hypothesis", "verify"), "reproduce": ("jinja2", "report")}
 
 
 def test_simulate_and_resolve_need_no_extra_and_what_does_says_which_in_one_sentence() -> None:
@@ -75,8 +75,7 @@ def test_a_command_without_its_extra_ends_before_it_computes_and_names_it(line: 
     assert done.stderr == "iapb: " + TOLD.format("The command", package, extra) + "\n"
 
 
-@pytest.mark.parametrize("name", ["reference", "verification", "reports"])
-@pytest.mark.parametrize("own", ["{}/__init__.py", "{}.py"])
+@pytest.mark.parametrize(("name", "own"), [("reference", "{}/__init__.py"), ("reports", "{}.py")])
 def test_a_foreign_package_of_the_same_name_is_named(name: str, own: str, tmp_path: Path) -> None:
     file = tmp_path / own.format(name)
     file.parent.mkdir(exist_ok=True)

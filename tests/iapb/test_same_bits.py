@@ -9,11 +9,11 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).with_name("same_bits.py")
+from tests.iapb import same_bits
+
 SETTINGS = {
     "a processor of 2004": {
         "OPENBLAS_CORETYPE": "Prescott",
@@ -25,7 +25,7 @@ SETTINGS = {
 
 
 def _hashes(settings: dict[str, str]) -> dict[str, str]:
-    command = [sys.executable, SCRIPT]
+    command = [sys.executable, same_bits.__file__]
     done = subprocess.run(command, env=os.environ | settings, capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout))
 
@@ -33,7 +33,7 @@ def _hashes(settings: dict[str, str]) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def here() -> dict[str, str]:
     """Hashes under the settings of the tests."""
-    return _hashes({})
+    return same_bits.hashes()
 
 
 @pytest.mark.parametrize("setting", SETTINGS)

@@ -13,11 +13,9 @@ from iapb.advice.certificate import certify
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate
-from iapb.system import System
 from reference.complementarity import ImpactProblem
 from reference.complementarity.laws import Outcome, poisson
 from reference.event_driven import LinearSystem, event_driven
-from reference.rigid_body import model_of
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
 from tests.reference.scenes import G, scene_of
@@ -133,17 +131,6 @@ def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
     assert np.abs(v[:, 1]).max() <= truth.bound.velocity
 
 
-def test_a_tumbling_body_keeps_energy_and_angular_momentum() -> None:
-    scene = load_scene(find_scene("tumbling_body"))
-    q, v = scene_truth(scene, 0.5).state(np.linspace(0.0, 0.5, 6))
-    inertia, mechanism = np.diag([1e-3, 2e-3, 2.8e-3]), System(scene).mechanism
-    axes = [mechanism.placements(model_of(mechanism).normalize(x))[0][0] for x in q]
-    momentum = [turn @ inertia @ w[3:] for turn, w in zip(axes, v, strict=True)]
-    assert np.ptp(momentum, axis=0) == pytest.approx(0.0, abs=1e-9 * 2e-3 * 6.0 * 10.0)
-    energy = [w[3:] @ inertia @ w[3:] for w in v]
-    assert energy == pytest.approx([energy[0]] * len(energy), rel=1e-9)
-
-
 @pytest.mark.parametrize(("given", "error", "says"), [
     ((lambda: DROP.with_values({"hand": {"body": "body_0"}}), 0.1, True), ArgumentError, "a scene without quaternions"),
     ((lambda: load_scene(find_scene("box_stack")), 0.1), SolverError, "box_stack: .* contacts overlap"),
@@ -177,7 +164,7 @@ def limited_arm(**values: object) -> Scene:
 def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str) -> None:
     truth, errors = scene_truth(limited_arm(), 0.6), []
     assert len(truth.events) >= 2  # both joints meet a limit
-    for rate in (1000.0, 4000.0):
+    for rate in (1000.0, 2500.0 if world == "ideal" else 4000.0):
         stiffness = {"contact.forces": "paper", "contact.stiffness": 5e4 * rate / 1000.0}
         run = run_world(limited_arm(rate=rate, **stiffness), world)
         errors.append(float(np.abs(run.q - truth.state(run.time)[0]).max()))

@@ -28,20 +28,14 @@ READ = {
 NODES = [node for name in WORLDS for node in ast.walk(ast.parse((REFERENCE / f"{name}.py").read_text("utf-8")))]
 
 
-def test_the_references_import_descriptions_of_the_engine_and_no_algorithm() -> None:
+def test_the_references_share_descriptions_with_the_engine_and_no_algorithm() -> None:
     found = {node.module for node in NODES if isinstance(node, ast.ImportFrom)}
     assert {name for name in found if name and name.split(".")[0] == "iapb"} == SHARED
     assert not any(isinstance(node, ast.Import) and node.names[0].name.startswith("iapb") for node in NODES)
-
-
-def test_the_references_read_only_descriptions_from_the_engines_objects() -> None:
     for owner, allowed in READ.items():
         read = {node.attr for node in NODES if isinstance(node, ast.Attribute)
                 and owner in (getattr(node.value, "id", None), getattr(node.value, "attr", None))}  # fmt: skip
         assert read == allowed
-
-
-def test_the_shared_modules_are_named_in_the_documents() -> None:
     text = (REFERENCE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
     section = text.split("## What the engine and the references share")[1].split("\n## ")[0]
     assert all(f"`{name}`" in section for name in SHARED)

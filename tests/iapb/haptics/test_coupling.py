@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.contact.kernels.step import advance
 from iapb.contact.laws import Penalty
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling, UnilateralCoupler
-from iapb.haptics.rendering import couple, drive_device
 from iapb.scene import find_scene, load_scene
-from iapb.system import System
+from iapb.simulation import Simulation
 
 FOUR_CHANNEL = FourChannel((100.0, 100.0, 0.5), (70.0, 70.0, 0.375))  # Table I
 UNILATERAL = UnilateralCoupler((1000.0, 1000.0, 2.5), (50.0, 50.0, 0.125))
@@ -19,20 +17,10 @@ UNILATERAL = UnilateralCoupler((1000.0, 1000.0, 2.5), (50.0, 50.0, 0.125))
 FAR = load_scene(find_scene("peg_corner")).with_values({"bodies.peg.position": [1.0, -1.0, 0.08]})
 
 
-def started(coupling, scene=FAR):
-    system = System(scene)
-    return system.world_under(Penalty()), system.make_state(), system.make_port(coupling)
-
-
-def step(world, state, port):
-    couple(world, state, port)
-    assert advance(world, state, port.applied) == 0
-    drive_device(world, state, port)
-
-
 def pair_energies(damping, steps):
     """Energy of tool, device and the spring between them [J], no hand, started 2 cm and 0.1 rad apart."""
-    world, state, port = started(FOUR_CHANNEL, FAR.with_values({"hand.force": [0, 0, 0]}))
+    simulation = Simulation(FAR.with_values({"hand.force": [0, 0, 0]}), Penalty(), FOUR_CHANNEL)
+    state, port = simulation.state, simulation.port
     port.device_q[:] += [0.02, -0.01, 0.1]
     port.damping[:] *= damping
     energies = []
@@ -40,7 +28,7 @@ def pair_energies(damping, steps):
         stretch, mass = port.device_q - state.q, state.mass_matrix
         kinetic = state.v @ mass @ state.v + port.device_v @ mass @ port.device_v
         energies.append(0.5 * (kinetic + np.sum(np.multiply(FOUR_CHANNEL.stiffness, stretch * stretch))))
-        step(world, state, port)
+        simulation.step()
     return np.array(energies)
 
 
@@ -56,9 +44,10 @@ def test_with_its_damping_reversed_the_pair_gains_energy():
 
 @pytest.mark.parametrize("coupling", [FOUR_CHANNEL, UNILATERAL], ids=lambda c: c.name)
 def test_in_free_motion_tool_and_device_go_together(coupling):
-    world, state, port = started(coupling)
+    simulation = Simulation(FAR, Penalty(), coupling)
+    state, port = simulation.state, simulation.port
     for _ in range(100):
-        step(world, state, port)
+        simulation.step()
     assert port.device_q == pytest.approx(state.q, abs=1e-12)
     assert np.all(np.sign(port.device_v[:2]) == [-1.0, 1.0])  # where the hand pushes
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from iapb import find_scene, load_scene
-from iapb.scene import Scene, SpatialScene, scene_from_text, scene_names
+from iapb.scene import Scene, SpatialScene, scene_names
 from reference.worlds import find_world
+from tests.iapb.contact.paper import scene_of
 from verification.clock import Times
 from verification.cost.effects import NOTHING, SWITCHED, Loop, Variant, effects_of, saved
 
@@ -34,12 +35,6 @@ def test_without_walls_or_hand_the_peg_goes_elsewhere() -> None:
     assert found["impulses"]["position"] > 0.1
 
 
-def test_without_velocity_terms_a_pendulum_swings_otherwise() -> None:
-    found = _measured(_scene("double_pendulum", 0.5))
-    assert found["velocity_terms"]["energy"] > 0.1
-    assert found["gravity"]["position"] > 10.0
-
-
 def test_what_the_rounds_do_not_agree_on_is_noise() -> None:
     assert saved(Times((0.7, 0.9, 0.9, 0.8, 1.3))) == pytest.approx(10.0)  # one round may be disturbed
     assert saved(Times((0.7, 0.9, 1.1, 1.2, 0.8))) is None and saved(Times((1.0,))) is None
@@ -48,7 +43,7 @@ def test_what_the_rounds_do_not_agree_on_is_noise() -> None:
 
 @pytest.mark.parametrize("name", scene_names())
 def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
-    """Every switch that the scene leaves off is turned on: one by one, and all at once.
+    """Every switch that the scene leaves off is turned on, all at once, and on three scenes one by one.
 
     M is a constant of some scenes in space to rounding alone: turned to each pose it has other last bits.
     """
@@ -59,37 +54,22 @@ def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
     idle = [switch for switch in SWITCHED if not getattr(whole.simulation.world.switches, switch)
             and not (spatial and switch == "varying_inertia")]
     assert {"joint_damping", "gravity", "clustering"} & {*idle}
-    for switches in (*((switch,) for switch in idle), tuple(idle)):
+    alone = idle if name in ("peg_corner", "arm_obstacles", "peg_hole_space") else ()
+    for switches in (*((switch,) for switch in alone), tuple(idle)):
         other = Loop(scene, world, Variant(switches=switches, on=True))
         other.sample()
         assert all(getattr(other.simulation.world.switches, switch) for switch in switches)
         assert whole.same_motion(other), switches
 
 
-_SLIDER = """
-name: slider
-rate: 500
-duration: 0.2
-gravity: [0, -9.81]
-bodies:
-  - {{name: cart, joint: prismatic, axis: [1, 0], mass: 1.0, velocity: [{speed}],
-     shapes: [{{kind: circle, radius: 0.05}}]}}
-walls:
-  - {{name: wall, kind: half_plane, point: [0.2, 0], normal: [-1, 0]}}
-contact: {{friction: 0.5, stiffness: 1e3, damping: 1}}
-"""
-
-
-def test_a_wall_that_is_never_reached_changes_nothing_and_gravity_on_a_slider_is_off() -> None:
-    """At 0.5 m/s the cart ends 50 mm before the wall; at 1 m/s it strikes it, and only friction has nothing to do."""
-    short, far = (
-        {row["effect"]: row for row in effects_of(scene_from_text(_SLIDER.format(speed=speed)), rounds=1).records()}
-        for speed in (0.5, 1.0)
-    )
-    assert not short["gravity"]["active"] and "nothing moves along gravity" in short["gravity"]["reason"]
+def test_a_wall_that_is_never_reached_changes_nothing() -> None:
+    """At 0.5 m/s the cart ends 50 mm before the wall."""
+    cart = {"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "velocity": [0.5],
+            "shapes": [{"kind": "circle", "radius": 0.05}]}
+    wall = {"name": "wall", "kind": "half_plane", "point": [0.2, 0], "normal": [-1, 0]}
+    contact = {"friction": 0.5, "stiffness": 1e3, "damping": 1}
+    scene = scene_of([cart], [wall], rate=500.0, duration=0.2, contact=contact)
+    found = {row["effect"]: row for row in effects_of(scene, rounds=1).records()}
     for name in ("friction", "impulses", "penalty_stiffness", "contact_damping"):
-        assert short[name]["active"] and short[name]["change"] == f"{NOTHING}: nothing touches"
-    assert short["wall_contacts"]["change"] == f"{NOTHING}: no body touches a wall"
-    assert far["friction"]["change"] == f"{NOTHING}: all states are the same to the last bit"
-    for name in ("wall_contacts", "impulses"):
-        assert not far[name]["change"].startswith(NOTHING) and far[name]["position"] > 0.0
+        assert found[name]["active"] and found[name]["change"] == f"{NOTHING}: nothing touches"
+    assert found["wall_contacts"]["change"] == f"{NOTHING}: no body touches a wall"

@@ -7,21 +7,9 @@ import pytest
 
 from iapb.system import System
 from verification.check import Study
-from verification.cost import robots, steps
+from verification.cost import growth, steps
 from verification.cost.accuracy import BUDGET_ROWS, Stopped
 from verification.cost.calls import PRINTED
-from verification.cost.growth import (
-    ALLOWED,
-    FACTORED,
-    FACTORS,
-    MILLISECOND,
-    PAPER_STEP,
-    SIZES,
-    fitted,
-    most_contacts,
-    power_law,
-    scaling,
-)
 from verification.cost.resting import RESTING
 from verification.cost.steps import OwnLoop
 from verification.finding import NOT_COMPUTED
@@ -74,38 +62,30 @@ def test_without_mujoco_the_race_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_pairs_tested_grow_linearly_where_all_pairs_grow_quadratically() -> None:
     """All pairs give 2 in the limit; the density of the field, and with it the neighbours of a disc, changes a little.
     """
-    costs = steps.BODIES.table(Study(), (20, 50, 100, 200))
-    assert power_law(costs.column("bodies"), costs.column("pairs tested")) < 1.2
-    assert power_law(costs.column("bodies"), costs.column("pairs of shapes")) > 1.9
-
-
-def test_robots_are_timed_in_both_forms(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pinocchio")
-    monkeypatch.setattr(robots, "STATES", 3)
-    monkeypatch.setattr(robots, "ROUNDS", {"quick": 2})
-    table = robots.ROBOTS.table(Study(), list(robots.FILES)[:1])
-    assert table.column("form") == [robots.ONE, robots.ONE, robots.MANY, robots.MANY]
-    assert min(table.column("ours")) > 0.0 and min(table.column("Pinocchio")) > 0.0
+    costs = steps.BODIES.table(Study(), (20, 50, 100))
+    assert growth.power_law(costs.column("bodies"), costs.column("pairs tested")) < 1.2
+    assert growth.power_law(costs.column("bodies"), costs.column("pairs of shapes")) > 1.9
 
 
 def test_the_most_contacts_are_the_last_in_time() -> None:
     keys = ("method", "deadline", "coordinates", "contacts", "late calls")
-    rows = [("a", MILLISECOND, 3, 6, 0), ("a", MILLISECOND, 3, 12, ALLOWED), ("a", MILLISECOND, 3, 30, ALLOWED + 1),
-            ("a", PAPER_STEP, 3, 30, 0), ("b", MILLISECOND, 3, 6, 9)]  # fmt: skip
+    rows = [("a", growth.MILLISECOND, 3, contacts, late) for contacts, late in (
+        (6, 0), (12, growth.ALLOWED), (30, growth.ALLOWED + 1))]
+    rows += [("a", growth.PAPER_STEP, 3, 30, 0), ("b", growth.MILLISECOND, 3, 6, 9)]
     trials = table_from(dict(zip(keys, row, strict=True)) for row in rows)
-    assert most_contacts(trials) == {"a": {3: 12}, "b": {3: 0}}
+    assert growth.most_contacts(trials) == {"a": {3: 12}, "b": {3: 0}}
 
 
 def test_exponents_and_the_steepest_range_are_those_of_the_method_and_the_axis() -> None:
-    power = {FACTORED: (1.0, 2.0), PRINTED: (0.5, 3.0)}  # over contacts and coordinates, above the smallest size
+    power = {growth.FACTORED: (1.0, 2.0), PRINTED: (0.5, 3.0)}  # over contacts and coordinates, above the smallest size
     sizes = [(12, c) for c in (30, 60, 120)] + [(d, 60) for d in (6, 24)]
     table = table_from(
         {"method": method, "coordinates": d, "contacts": c, "time [µs]": (max(c, 60) / 60) ** a * (d / 12) ** b}
         for method, (a, b) in power.items() for d, c in sizes)  # fmt: skip
     for method, (over_contacts, over_coordinates) in power.items():
-        row = fitted(table, method, "contacts")
+        row = growth.fitted(table, method, "contacts")
         assert (row["steepest from"], row["to"], row["there"]) == (60, 120, pytest.approx(over_contacts))
-        row = fitted(table, method, "coordinates")
+        row = growth.fitted(table, method, "coordinates")
         assert (row["exponent"], row["there"]) == (pytest.approx(over_coordinates), pytest.approx(over_coordinates))
 
 
@@ -119,7 +99,8 @@ def test_every_budget_is_passive_and_the_whole_one_meets_restitution() -> None:
 
 def test_sizes_are_timed_by_both_methods() -> None:
     """Times themselves are never judged by a test: that is for `iapb bench`."""
-    found = scaling(Study(), ((3, 4), (12, 600)))
-    assert [(row["method"], row["contacts"]) for row in found] == [(FACTORED, 4), (PRINTED, 4), (FACTORED, 600)]
+    found = growth.scaling(Study(), ((3, 4), (12, 600)))
+    timed = [(row["method"], row["contacts"]) for row in found]
+    assert timed == [(growth.FACTORED, 4), (PRINTED, 4), (growth.FACTORED, 600)]
     assert all(0.0 < row["lower quartile [µs]"] <= row["upper quartile [µs]"] for row in found)
-    assert {(12, contacts) for contacts in FACTORS} <= set(SIZES)  # where the printed formula has its targets
+    assert {(12, contacts) for contacts in growth.FACTORS} <= set(growth.SIZES)  # the printed formula has targets there

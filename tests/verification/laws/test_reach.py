@@ -53,7 +53,8 @@ UNSOUND: dict[str, tuple[Callable[..., Floats], int]] = {
 @pytest.mark.parametrize("name", UNSOUND)
 def test_every_unsound_resolver_is_found(name: str) -> None:
     resolver, impacts = UNSOUND[name]
-    report = check_passivity(resolver, impacts=impacts, search=0)
+    laws = ["kinetic_energy", "restitution"] if name in CONDITIONS and name != "one call in 1,000" else None
+    report = check_passivity(resolver, impacts=impacts, search=0, laws=laws)
     assert not report.passed and report.broken_laws, report
 
 
