@@ -44,6 +44,7 @@ class PinocchioMechanism:
         self._below = np.tril_indices(self.nv, -1)
         body = self.pin.FrameType.BODY  # frames of the bodies, in the mechanism's order; the first frame is the world
         self._bodies = [k for k, frame in enumerate(model.frames) if k and frame.type == body]
+        self._places = {model.frames[k].name: place for place, k in enumerate(self._bodies)}
 
     def mass_matrix(self, q: Floats) -> Floats:
         """Return M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
@@ -67,22 +68,6 @@ class PinocchioMechanism:
         """Return tau = M dv + B + G (d,)."""
         self.model.gravity.linear = np.array(g, dtype=np.float64)
         return np.array(self.pin.rnea(self.model, self.data, q, v, dv))
-
-    def frame_jacobian(self, q: Floats, body: str) -> Floats:
-        """Return J (6, d) of the body's linear velocity at its origin and angular velocity, in world axes."""
-        return self.bodies(q)[2][self._index(body)]
-
-    def point_jacobian(self, q: Floats, body: str, point: Floats) -> Floats:
-        """Return J (3, d) of a world point fixed to the body: v_origin + omega x (point - origin)."""
-        jacobian = self.frame_jacobian(q, body)
-        x, y, z = point - self.placement(q, body)[1]
-        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        return jacobian[:3] - across @ jacobian[3:]
-
-    def placement(self, q: Floats, body: str) -> tuple[Floats, Floats]:
-        """Return axes (3, 3) and origin (3,) [m] of a body in the world."""
-        axes, origins, _ = self.bodies(q)
-        return axes[self._index(body)], origins[self._index(body)]
 
     def bodies(self, q: Floats) -> tuple[Floats, Floats, Floats]:
         """Return axes (n + 1, 3, 3), origins (n + 1, 3), Jacobians (n + 1, 6, d) of n bodies and, last, the world."""
@@ -150,11 +135,18 @@ class PinocchioMechanism:
         return (partial(self.pin.crba, self.model, self.data),
                 partial(self.pin.nonLinearEffects, self.model, self.data))  # fmt: skip
 
-    def _index(self, body: str) -> int:
-        names = [self.model.frames[k].name for k in self._bodies]
-        if body not in names:
+    def index(self, body: str) -> int:
+        """Return the place of a body in the arrays of `bodies`."""
+        if body not in self._places:
             raise ArgumentError("body", body, "the name of a body of the model")
-        return names.index(body)
+        return self._places[body]
+
+
+def at_lever(jacobian: Floats, lever: Floats) -> Floats:
+    """Return J (3, d) of a point from the Jacobian (6, d) of its body and its distance (3,) from the body's origin."""
+    x, y, z = lever
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(jacobian[:3] - across @ jacobian[3:])
 
 
 @numba.njit(cache=True, fastmath=False)

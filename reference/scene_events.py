@@ -40,7 +40,7 @@ from reference import Floats
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
 from reference.contact_rows import find_rows, mechanics_of
-from reference.rigid_body import PinocchioMechanism, model_of
+from reference.rigid_body import PinocchioMechanism, at_lever, model_of
 from reference.rigid_step import nearest_velocity
 
 Contact = tuple[int, int, int]
@@ -152,11 +152,9 @@ class _Motion:
         hand = self.scene.hand
         if hand is None:
             return np.zeros(mechanics.nv)
-        rotation, origin = mechanics.placement(q, hand.body)
-        point = origin + rotation @ np.array([*hand.point, 0.0])[:3]
-        wrench = wrenches_of(self.scene, [0.0])[0]
-        turning = mechanics.frame_jacobian(q, hand.body)[3:].T @ wrench[3:]
-        return np.asarray(mechanics.point_jacobian(q, hand.body, point).T @ wrench[:3] + turning, np.float64)
+        axes, _, rows = (found[mechanics.index(hand.body)] for found in mechanics.bodies(q))
+        moved, wrench = at_lever(rows, axes @ np.array([*hand.point, 0.0])[:3]), wrenches_of(self.scene, [0.0])[0]
+        return np.asarray(moved.T @ wrench[:3] + rows[3:].T @ wrench[3:], np.float64)
 
     def _pull(self, distance: Floats, speed: Floats) -> Floats:
         return np.asarray(self.gains.stiffness) * distance + np.asarray(self.gains.damping) * speed

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 from iapb.run import Run
@@ -231,20 +232,32 @@ class Topic:
     checks: tuple[Check, ...]
     says: Callable[[Mapping[str, Table], Sequence[Part]], str | Part]
 
-    def __call__(self, run: Callable[..., Run], depth: str, progress: Callable[[int, int], None]) -> Finding:
-        """Run every check and return the finding. A check that raises leaves no table; the finding names it."""
-        study, total = Study(run, depth), len(self.checks)
-        tables: dict[str, Table] = {}
+    def __call__(
+        self, run: Callable[..., Run], depth: str, progress: Callable[[int, int], None],
+        known: Mapping[str, Table] | None = None,
+    ) -> Finding:  # fmt: skip
+        """Run every check and return the finding. A check that raises leaves no table; the finding names it.
+
+        known : tables that `measure` has made, by key of the check
+        """
         failures: list[Failure] = []
-        for done, check in enumerate(self.checks):
-            progress(done, total)
+        return self.conclude(self.measure(self.checks, run, depth, progress, failures, known or {}), failures)
+
+    def measure(
+        self, checks: Sequence[Check], run: Callable[..., Run], depth: str, progress: Callable[[int, int], None],
+        failures: list[Failure], known: Mapping[str, Table] = MappingProxyType({}),
+    ) -> dict[str, Table]:  # fmt: skip
+        """Return the tables of some of the checks by key; the cases that raise are added to `failures`."""
+        study, tables = Study(run, depth, results={("table", key): table for key, table in known.items()}), {}
+        for done, check in enumerate(checks):
+            progress(done, len(checks))
             study.failures = []
             table = attempt("all of it", partial(study.table, check), study.failures)
             if table is not None:
                 tables[check.key] = table
             failures += [replace(one, case=f"{check.key}, {one.case}") for one in study.failures]
-        progress(total, total)
-        return self.conclude(tables, failures)
+        progress(len(checks), len(checks))
+        return tables
 
     def conclude(
         self, tables: Mapping[str, Table], failures: Sequence[Failure] = (), given: Iterable[Part] = ()

@@ -21,6 +21,7 @@ from verification.table import HOLDS, Row, Table
 
 _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
 _SLOW = ("subnormal velocities",)  # takes 2 ms an impact, the others some µs: a quarter of the impacts
+CERTIFIED_RUNS = "certified runs"  # the check that needs the runs of all other stages
 FEW = 100  # runs that are certified in this process, which is faster than to start others
 _NOTE = ("Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: impacts for which no step was passive, so that v⁺ = v⁻. "
          "Energy cost: the extra loss at e = 1, compared with the same impact without clamp, in units of 10 d ε √κ(M).")
@@ -46,23 +47,15 @@ def _rows(folder: Path, name: str) -> list[Row]:
 
 
 def _certify_beside(study: Study, names: Sequence[str]) -> None:
+    """Certify the runs in processes; a run that raises there is tried again, and named, without them."""
     if len(names) > FEW:
-        _beside(study, partial(_rows, study.run.store.folder), names)  # type: ignore[attr-defined]
+        rows = partial(_rows, study.run.store.folder)  # type: ignore[attr-defined]
+        found = processes(cores())(partial(attempted, rows), names)
+        study.results.update((name, given) for name, given in found if given is not None)
 
 
-def _draw_beside(study: Study, families: Sequence[str]) -> None:
-    if cores() > 1:
-        _beside(study, partial(_drawn, study.depth), families)
-
-
-def _beside(study: Study, compute: Callable[[Any], Any], cases: Sequence[str]) -> None:
-    """Compute the rows of cases in processes; a case that raises there is tried again, and named, without them."""
-    found = processes(cores())(partial(attempted, compute), cases)
-    study.results.update((case, given) for case, given in found if given is not None)
-
-
-def _drawn(depth: str, family: str) -> Row:
-    return exact_energy(family, _DRAWN[depth] // (4 if family in _SLOW else 1))
+def _drawn(study: Study, family: str) -> Row:
+    return exact_energy(family, _DRAWN[study.depth] // (4 if family in _SLOW else 1))
 
 
 def attempted(compute: Callable[[Any], Any], part: Any) -> Any:
@@ -119,10 +112,9 @@ def _runs(study: Study) -> Any:
 TOPIC = Topic(
     key="exact-energy", title="Exact energy", question="Does any impact gain energy, even in the last bit?",
     checks=(
-        Check(key="certified runs", question="", cases=_runs, prepare=_certify_beside, row=_certified,
+        Check(key=CERTIFIED_RUNS, question="", cases=_runs, prepare=_certify_beside, row=_certified,
               says=_recorded_says),
-        Check(key="adverse impacts", question="", cases=lambda study: ADVERSE_FAMILIES, prepare=_draw_beside,
-              row=lambda study, family: study.once(family, lambda: _drawn(study.depth, family)), says=_drawn_says,
+        Check(key="adverse impacts", question="", cases=lambda study: ADVERSE_FAMILIES, row=_drawn, says=_drawn_says,
               rule=verdict_of_families, note=_NOTE),
     ),
     says=_answer,

@@ -16,7 +16,7 @@ from reports import batches
 from reports.evidence import runs
 from reports.evidence.depends import depends_of
 from reports.evidence.stage import Stage
-from reports.evidence.topics import CLAIM_STAGES, TOPICS, failed_topic, plans
+from reports.evidence.topics import AHEAD, CLAIM_STAGES, TOPICS, failed_topic, plans
 from reports.figures.paper import arm_energies
 from reports.pages.records import Evidence, FailedCases, StoredFile
 from reports.provenance import PEERS, collect_provenance, this_machine
@@ -27,8 +27,14 @@ from reports.uses import UsedRun
 from verification import haptic_rate
 from verification.check import Study
 from verification.claims import peg
+from verification.claims.speed import C19, C22
 from verification.cost import effects
+from verification.cost.accuracy import ACCURACY
+from verification.cost.growth import SCALING
+from verification.cost.solvers import IMPACT_TIMES
+from verification.cost.steps import BODIES, RACES
 from verification.finding import Failure, Finding, attempt
+from verification.hard_cases import judge
 from verification.hard_cases.findings import on_hard_cases
 from verification.proofs import on_proofs
 
@@ -50,6 +56,7 @@ CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
 # for proofs and the slowest runs. The stages after them are shorter.
 ON_THE_PEG = "claims on the peg"
 FIRST = ("Coq development", "proofs", ON_THE_PEG, "properties", "claims")
+COMPILED_AHEAD = (C19, C22, ACCURACY, RACES, SCALING, BODIES, IMPACT_TIMES)  # checks whose kernels only they call
 PAUSE = 0.2  # [s] between two looks at what the workers say
 
 
@@ -66,7 +73,10 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     read = attempt("all of it", partial(runs.figure_runs, runner, partial(progress, FIGURE_RUNS), lost), lost)
     tilted = attempt(runs.TILTED, partial(runs.tilted_runs, runner), lost)
     for stage in stages.values():
-        _fill(stage, runner, depth, progress)
+        ahead = stages.get(stage.name + AHEAD)
+        _fill(stage, runner, depth, progress, ahead)
+        if ahead is not None:
+            ahead.failures.clear()  # the topic has tried these cases again
 
     def finding(name: str, said: Callable[..., Finding]) -> Finding:
         stage = stages[name]
@@ -102,11 +112,12 @@ def _failed(stage: Stage) -> Finding:
     return failed_topic(stage.name, stage.failures[-1])
 
 
-def _fill(stage: Stage, runner: Runner, depth: str, progress: Progress) -> Stage:
-    """Read or compute the records of a stage, unless it has been done."""
+def _fill(stage: Stage, runner: Runner, depth: str, progress: Progress, ahead: Stage | None = None) -> Stage:
+    """Read or compute the records of a stage, unless it has been done; `ahead` has tables of its checks."""
     plan, said = plans()[stage.name], partial(progress, stage.name)
+    known = {"known": ahead.records} if ahead is not None and not ahead.failures else {}
     if stage.records is None and not stage.failures:
-        stage.fill(runner, lambda failures: plan.compute(runner, depth, said, failures))
+        stage.fill(runner, lambda failures: plan.compute(runner, depth, said, failures, **known))
         said(1, 1)
     for run in stage.runs.values():
         runner.use(run)
@@ -128,6 +139,7 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
         for name in ahead:
             running |= {pool.submit(_slowest_runs, out, depth)} if name == ON_THE_PEG else set()
             running |= {pool.submit(_filled, stages[name], out, depth)}
+        running.add(pool.submit(_compile_ahead, out, depth))
         while running:
             done, running = wait(running, PAUSE, FIRST_COMPLETED)
             stages |= {stage.name: stage for future in done if isinstance(stage := future.result(), Stage)}
@@ -139,6 +151,14 @@ def _figure_runs(out: Path) -> Stage | None:
     """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those that fail."""
     runs.figure_runs(Runner(out / "runs"), partial(_tell, FIGURE_RUNS), [])
     return None
+
+
+def _compile_ahead(out: Path, depth: str) -> None:
+    """Compute one case of checks that measure times, in a worker, and drop it: later their kernels are compiled."""
+    study = Study(Runner(out / "runs"), depth)
+    judge.warm_up()
+    for check in COMPILED_AHEAD:
+        attempt("", lambda check=check: check.table(study, list(check.cases(study))[:1]), [])  # type: ignore[misc]
 
 
 def _slowest_runs(out: Path, depth: str) -> None:

@@ -78,7 +78,7 @@ class Stage:
         self.records = self._checked(content["records"])
 
     def _compute(self, runner: Runner, compute: Callable[[list[Failure]], Any]) -> None:
-        with runner.recording(self.name) as used:
+        with runner.recording(self.name.partition(",")[0]) as used:  # of a topic, not of its part
             computed = compute(self.failures)
         records = plain(computed)
         found = self._checked(json.loads(json.dumps(records)))

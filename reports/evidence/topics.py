@@ -8,6 +8,7 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
+from reports.evidence.exact_energy import CERTIFIED_RUNS
 from reports.runner import Runner
 from verification import claims
 from verification.claims import peg
@@ -58,10 +59,11 @@ class Plan:
     """
 
     kind: Any
-    compute: Callable[[Runner, str, Progress, list[Failure]], Any]
+    compute: Callable[..., Any]
     timed: bool = False
 
 
+AHEAD = ", without times"  # end of the name of the stage that has the checks of a timed topic that measure no time
 CLAIM_STAGES = ("claims", "claims on the peg", "claims on times")
 
 
@@ -87,11 +89,22 @@ def checked_claims(
     return found
 
 
-def _plan(name: str) -> Plan:
-    """Return the plan of a topic; it is timed if one of its checks has a column of times."""
+def _plans_of(name: str) -> dict[str, Plan]:
+    """Return the plan of a topic, timed if one of its checks has a column of times, and that of its other checks.
+
+    The other checks are computed first, beside other stages, so that little runs alone.
+    """
     topic = _topic(name)
-    timed = any(check.timed for check in getattr(topic, "checks", ()))
-    return Plan(Finding, lambda runner, depth, progress, failures: topic(runner, depth, progress), timed)
+    checks = getattr(topic, "checks", ())
+    timed = any(check.timed for check in checks)
+    ahead = [check for check in checks if not check.timed and check.key != CERTIFIED_RUNS]
+    if not (timed or len(ahead) < len(checks)):
+        return {name: Plan(Finding, lambda runner, depth, progress, failures: topic(runner, depth, progress))}
+    return {
+        name + AHEAD: Plan(dict[str, Table], partial(topic.measure, ahead)),
+        name: Plan(Finding, lambda runner, depth, progress, failures, known=None: topic(runner, depth, progress, known),
+                   timed),
+    }
 
 
 def plans() -> dict[str, Plan]:
@@ -105,6 +118,6 @@ def plans() -> dict[str, Plan]:
         "hard cases": Plan(tuple[Finding, ...], lambda runner, _, *given: hard_cases(runner, *given), timed=True),
         "accuracy": Plan(Table, lambda runner, depth, progress, failures: work_precision(
             progress=progress, failures=failures), timed=True),
-        **{name: _plan(name) for name in TOPICS},
+        **{stage: plan for name in TOPICS for stage, plan in _plans_of(name).items()},
         "effects": Plan(dict[str, Table], lambda *given: effects_of_scenes(*given[2:]), timed=True),
     }  # fmt: skip

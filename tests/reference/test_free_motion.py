@@ -205,4 +205,4 @@ def test_a_model_in_another_order_and_an_unknown_body_are_refused() -> None:
     with pytest.raises(ArgumentError, match="depth-first"):
         rigid_body.model_of(Mechanism([root, left, right, hand]))
     with pytest.raises(ArgumentError, match="name of a body"):
-        model.placement(np.zeros(4), "foot")
+        model.index("foot")

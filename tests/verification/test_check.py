@@ -51,6 +51,15 @@ def test_a_sentence_or_a_check_that_raises_costs_itself_alone():
     assert [part.verdict for part in found.parts] == [REFUTED, NOT_COMPUTED] and found.answer == "3 cases failed."
 
 
+def test_a_table_made_before_is_not_made_again():
+    calls = []
+    checks = a_check(cases=("a",)), a_check("second", cases=("a",), prepare=lambda study, cases: calls.append(cases))
+    topic = Topic(key="topic", title="Topic", question="?", checks=checks, says=lambda tables, parts: "All said.")
+    given = lambda *_: None  # noqa: E731
+    known = topic.measure(checks[1:], given, "quick", given, [])
+    assert topic(given, "quick", given, known) == topic(given, "quick", given) and calls == [("a",), ("a",)]
+
+
 def test_columns_follow_from_the_rows_and_have_their_marks():
     table = a_check(conditions=["case"], timed=["size [m]"], digits=2, note="A note.", holds=None).table_of(
         [{"case": "a", "holds": True}, {"size [m]": 2.0, "case": "b"}])  # fmt: skip

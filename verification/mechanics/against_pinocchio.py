@@ -29,7 +29,7 @@ from reference import Floats
 from reference.contact_finding import Contacts, find_contacts
 from reference.contact_rows import contact_jacobian, mechanics_of
 from reference.random_mechanisms import random_inertia, random_mechanism, random_state
-from reference.rigid_body import PinocchioMechanism, impulse_dynamics, model_from_urdf, model_of
+from reference.rigid_body import PinocchioMechanism, at_lever, impulse_dynamics, model_from_urdf, model_of
 from verification.check import Check, Study
 from verification.finding import NOT_TESTABLE, Part, verdict_of_law
 from verification.impacts import EPS
@@ -194,12 +194,13 @@ def compare(
     twice the kinetic energy. Point Jacobians are compared at a point one metre off each body's origin.
     """
     m, p, dv = mechanism, reference, np.cos(np.arange(mechanism.nv))
-    (rotations, positions), off = m.placements(q), np.array([0.6, 0.0, -0.8])
+    (rotations, positions), (axes, origins, rows) = m.placements(q), p.bodies(q)
     places, frames, points = list[Pair](), list[Pair](), list[Pair]()
     for b, name in enumerate(m.names):
-        places += zip((rotations[b], positions[b]), p.placement(q, name), strict=True)
-        frames += [(m.frame_jacobian(q, b), p.frame_jacobian(q, name))]
-        points += [(m.point_jacobian(q, b, positions[b] + off), p.point_jacobian(q, name, positions[b] + off))]
+        k, point = p.index(name), positions[b] + (0.6, 0.0, -0.8)
+        places += [(rotations[b], axes[k]), (positions[b], origins[k])]
+        frames += [(m.frame_jacobian(q, b), rows[k])]
+        points += [(m.point_jacobian(q, b, point), at_lever(rows[k], point - origins[k]))]
     apart, lifted = relative_difference, float(np.linalg.norm(gravity)) * _spread(m, q)
     return {
         "mass matrix": apart([(m.mass_matrix(q), p.mass_matrix(q))]),
