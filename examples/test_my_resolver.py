@@ -12,7 +12,7 @@ def my_resolver(mass_matrix, contact_jacobian, velocity, restitution):
     J, v, p = contact_jacobian, np.array(velocity), np.zeros(len(contact_jacobian))
     away = np.linalg.solve(mass_matrix, J.T)  # M⁻¹ Jᵀ
     wanted = -restitution * J @ velocity
-    for _ in range(100_000):
+    for _ in range(1_000):
         before = v.copy()
         for i, row in enumerate(J):
             stiffness = row @ away[:, i]

@@ -1,4 +1,11 @@
-"""Performs the blocks of one document in a process of its own: `python performing.py DOCUMENT ANSWERS.json`.
+"""The fenced blocks of a Markdown document, and `python performing.py DOCUMENT ANSWERS.json`, which performs them.
+
+    ```python            executed, in order, in one namespace for the document; a ```text block right after it is
+                         what it printed
+    ```console           "$ " starts a command (iapb, cat, pytest); the lines after it are its output
+    ```yaml, ```python   whose first line is "# some/file.yaml" or "# some/file.py": that file is written
+    ```diff              first line "# some/file.py": lines with "+" are added to that file beside its " " lines
+    ```sh                only read: every `make` target must exist
 
 The working directory is where files are written; for documents that add to the project it holds a copy of it.
 """
@@ -8,50 +15,86 @@ from __future__ import annotations
 import glob
 import io
 import json
+import re
 import shlex
 import sys
 import traceback
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
 
-from blocks import Block, read_blocks
+ROOT = Path(__file__).resolve().parents[2]
+_FENCED = re.compile(r"^```(\w+)\n(.*?)^```$", flags=re.M | re.S)
+_FILE_LINE = re.compile(r"# ([\w./-]+\.(?:py|yaml|toml))\n")
+_COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", flags=re.M)
 
 
-def perform(name: str) -> list[dict[str, str]]:
+@dataclass
+class Block:
+    """One thing to do: `kind` is python, command, file, diff or sh.
+
+    id : document and line; path : of a file to write or change
+    expected, span : the output printed below it, and where the document has it; None without output
+    """
+
+    id: str
+    kind: str
+    source: str
+    path: str = ""
+    expected: str | None = None
+    span: tuple[int, int] = (0, 0)
+
+
+def read_blocks(name):
+    """Return the blocks of a document in order."""
+    text, found = (ROOT / name).read_text(encoding="utf-8"), []
+    for fenced in _FENCED.finditer(text):
+        language, body = fenced.groups()
+        place, named = f"{name}:{text.count(chr(10), 0, fenced.start()) + 1}", _FILE_LINE.match(body)
+        if language == "text" and found[-1].kind == "python" and found[-1].expected is None:
+            found[-1].expected, found[-1].span = body, fenced.span(2)
+        elif language == "console":
+            found += [Block(place, "command", command[1], "", command[2],
+                            tuple(fenced.start(2) + k for k in command.span(2)))
+                      for command in _COMMAND.finditer(body)]  # fmt: skip
+        elif language in ("diff", "python", "yaml") and named:
+            found.append(Block(place, "diff" if language == "diff" else "file",
+                               body[named.end():] if language == "diff" else body, named[1]))  # fmt: skip
+        elif language in ("python", "sh"):
+            found.append(Block(place, language, body))
+        else:
+            raise ValueError(f"{place}: a block of kind {language!r} is shown but never checked")
+    return found
+
+
+def perform(name):
     """Do every block of a document; a failure is recorded, and the blocks after it are still tried.
 
     Files and lines are written first: what is imported once would not see a line that comes later.
     """
-    namespace: dict[str, Any] = {"__name__": "document"}
-    blocks = read_blocks(name)
-    answers: list[dict[str, str]] = [{}] * len(blocks)
+    namespace, blocks = {"__name__": "document"}, read_blocks(name)
+    answers = [{}] * len(blocks)
     for number, block in sorted(enumerate(blocks), key=lambda pair: pair[1].kind not in ("file", "diff")):
-        out, failure = io.StringIO(), ""
+        out, failure, path = io.StringIO(), "", Path(block.path)
         try:
             with redirect_stdout(out), redirect_stderr(out):
-                _perform(block, namespace)
+                if block.kind == "file":
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_text(block.source, encoding="utf-8")
+                elif block.kind == "diff":
+                    _apply_diff(path, block.source)
+                elif block.kind == "python":
+                    exec(compile(block.source, block.id, "exec"), namespace)
+                elif block.kind == "command":
+                    _command(shlex.split(block.source))
         except BaseException:  # whatever a documented line does is the finding
             failure = traceback.format_exc()
         answers[number] = {"output": out.getvalue(), "failure": failure}
     return answers
 
 
-def _perform(block: Block, namespace: dict[str, Any]) -> None:
-    path = Path(block.path)
-    if block.kind == "file":
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(block.source, encoding="utf-8")
-    elif block.kind == "diff":
-        apply_diff(path, block.source)
-    elif block.kind == "python":
-        exec(compile(block.source, block.id, "exec"), namespace)
-    elif block.kind == "command":
-        _command(shlex.split(block.source))
-
-
-def _command(words: list[str]) -> None:
+def _command(words):
     """The commands that documents use, in this process: a start of Python for each would take most of the time."""
     words = [found for word in words for found in (sorted(glob.glob(word)) if "*" in word else [word])]
     if words[0] == "iapb":
@@ -75,11 +118,9 @@ def _command(words: list[str]) -> None:
         raise ValueError(f"documents may not use the command {words[0]!r}: nothing would check it")
 
 
-def apply_diff(path: Path, text: str) -> None:
+def _apply_diff(path, text):
     """Insert the lines with "+" beside those with " ", each of which must be in the file exactly once."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    waiting: list[str] = []
-    place: int | None = None
+    lines, waiting, place = path.read_text(encoding="utf-8").splitlines(), [], None
     for line in text.splitlines():
         sign, content = line[:1], line[1:]
         if line.strip() in ("…", ""):

@@ -1,14 +1,9 @@
 """The pages of docs/ and the code speak of the same things: links, equations, notation, and the reference."""
 
-from __future__ import annotations
-
 import inspect
 import re
-from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import pytest
 
@@ -26,7 +21,7 @@ PUBLIC = [(package, name) for package in PACKAGES for name in getattr(import_mod
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
         path, _, anchor = target.partition("#")
         found = (page.parent / path) if path else page
@@ -37,7 +32,7 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert not anchor or anchor in anchors, f"{page.name}: {found.name} has no heading for #{anchor}"
 
 
-def test_every_equation_has_its_row_and_its_links_lead_to_functions_or_statements() -> None:
+def test_every_equation_has_its_row_and_its_links_lead_to_functions_or_statements():
     assert [number for number, _ in EQUATIONS] == [str(number) for number in range(1, 42)]
     for number, row in EQUATIONS:
         links = re.findall(r"`([\w/]+\.(?:py|txt)):(\w+)`", row)
@@ -48,7 +43,7 @@ def test_every_equation_has_its_row_and_its_links_lead_to_functions_or_statement
             assert defined.search((ROOT / file).read_text(encoding="utf-8")), f"({number}): {file}:{name}"
 
 
-def test_the_names_and_units_of_notation_are_those_of_the_code_and_the_run_files() -> None:
+def test_the_names_and_units_of_notation_are_those_of_the_code_and_the_run_files():
     ledger = set(simulate(find_scene("peg_corner"), steps=1).energy)
     code = "\n".join(path.read_text() for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
     words, names = set(re.findall(r"\w+", code)) | ledger, set(re.findall(r"`([A-Za-z_][\w.]*)`", NOTATION))
@@ -63,7 +58,7 @@ def test_the_names_and_units_of_notation_are_those_of_the_code_and_the_run_files
         assert units and wanted <= units, f"{quantity.name}: the page says {units}, the file {wanted}"
 
 
-def public_functions(module: ModuleType) -> Iterator[tuple[str, Callable[..., Any]]]:
+def public_functions(module):
     """Functions and methods that a module defines and does not hide."""
     for name, value in vars(module).items():
         if name.startswith("_") or getattr(value, "__module__", "") != module.__name__:
@@ -74,7 +69,7 @@ def public_functions(module: ModuleType) -> Iterator[tuple[str, Callable[..., An
 
 
 @pytest.mark.parametrize("page", API, ids=lambda page: page.stem)
-def test_whatever_the_reference_shows_has_a_docstring(page: Path) -> None:
+def test_whatever_the_reference_shows_has_a_docstring(page):
     assert f"api/{page.stem}" in (ROOT / "docs/index.md").read_text(encoding="utf-8")
     for name in re.findall(r"automodule:: ([\w.]+)", page.read_text(encoding="utf-8")):
         module = import_module(name)
@@ -83,7 +78,7 @@ def test_whatever_the_reference_shows_has_a_docstring(page: Path) -> None:
 
 
 @pytest.mark.parametrize(("package", "name"), PUBLIC, ids=[".".join(each) for each in PUBLIC])
-def test_names_of_the_packages_say_what_goes_in_and_out(package: str, name: str) -> None:
+def test_names_of_the_packages_say_what_goes_in_and_out(package, name):
     value = getattr(import_module(package), name)
     text = inspect.getdoc(value) or ""
     assert text or not inspect.isclass(value)

@@ -1,7 +1,5 @@
 """Worker processes: deaf to Ctrl-C from their first moment, ended with the work, and a killed one is said."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -15,32 +13,6 @@ import pytest
 from iapb.errors import IapbError
 from reports.batches import worker_pool
 
-
-def blocked() -> bool:
-    """What a worker says of itself."""
-    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
-
-
-def suicide() -> None:
-    """A worker that the system kills."""
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def test_workers_never_hear_ctrl_c_and_the_parent_does():
-    with worker_pool(1) as pool:
-        assert pool.submit(blocked).result(60)
-    assert not blocked()
-
-
-def test_what_stops_the_work_ends_the_workers_in_the_middle_of_theirs():
-    others = set(active_children())
-    with pytest.raises(KeyboardInterrupt), worker_pool(1) as pool:
-        pool.submit(time.sleep, 20.0)
-        [worker] = set(active_children()) - others
-        raise KeyboardInterrupt
-    assert worker.exitcode == -signal.SIGTERM
-
-
 ORPHANING = """
 import os, signal
 from reports.batches import worker_pool
@@ -49,6 +21,26 @@ if __name__ == "__main__":
         print(pool.submit(os.getpid).result(60), flush=True)
         os.kill(os.getpid(), signal.SIGKILL)
 """
+
+
+def blocked():
+    """What a worker says of itself."""
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def suicide():
+    """A worker that the system kills."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_workers_never_hear_ctrl_c_and_what_stops_the_work_ends_them_in_the_middle_of_theirs():
+    others = set(active_children())
+    with pytest.raises(KeyboardInterrupt), worker_pool(1) as pool:
+        assert pool.submit(blocked).result(60) and not blocked()
+        pool.submit(time.sleep, 20.0)
+        [worker] = set(active_children()) - others
+        raise KeyboardInterrupt
+    assert worker.exitcode == -signal.SIGTERM
 
 
 def test_a_worker_whose_parent_was_killed_ends(tmp_path):

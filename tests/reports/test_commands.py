@@ -1,7 +1,5 @@
 """The command line, in process: what it refuses, and each command once, from its words to its answer and its files."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -30,7 +28,6 @@ from verification.table import Column, Table, titled
 
 ROOT = Path(__file__).parents[2]
 SLOPE = ROOT / "tests" / "verification" / "worlds" / "slope.yaml"
-HEAVY = {"numpy", "numba", "cvxpy", "pinocchio", "sympy", "matplotlib", "h5py", "scipy", "coal", "flint", "hypothesis"}
 SHORT = ("peg_corner", "--set", "duration=0.4")
 STUDY = "name: two\ntitle: Two\nscene: two_discs\nworlds: [IAPB]\ngrid:\n  contact.restitution: [0.0, 0.5]\n"
 FAILED = Failure("four contacts", "SolverError", "no solution")
@@ -83,10 +80,12 @@ def answer(iapb):
 def here(tmp_path, monkeypatch):
     """Work in a folder with files that are not what they seem."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "bare").mkdir()
+    (tmp_path / "bare").mkdir(), (tmp_path / "given").mkdir()
     for name, text in {"wrong.yaml": WRONG_SCENE, "ball.yaml": "", "notes.h5": "not HDF5", "notes.md": "notes",
                        "text.npz": "no archive", "empty.npz": "", "own_devices.py": DEVICES, "own_number.py": "f = 3",
-                       "own_syntax.py": "def f(:", "own_fault.py": "f = 1 / 0"}.items():  # fmt: skip
+                       "own_syntax.py": "def f(:", "own_fault.py": "f = 1 / 0", "two.yaml": STUDY,
+                       "given/two.lcp": "2\n2 1\n1 2\n-5 -6\n", "given/bad.lcp": "2\nno number\n",
+                       "given/none.lcp": "1\n-1\n-1\n"}.items():  # fmt: skip
         (tmp_path / name).write_text(text)
     np.savez(tmp_path / "half.npz", v_minus=np.ones((1, 2)))
     (tmp_path / "cut.npz").write_bytes((tmp_path / "half.npz").read_bytes()[:99])
@@ -176,28 +175,66 @@ def test_a_refusal_names_the_value_and_what_is_expected_and_changes_no_file(stat
 
 
 @pytest.mark.parametrize(("status", "words", "said"), [(1, "run no_such_scene", "no_such_scene"), (2, "run", "scene"),
-                                                       (2, "run peg_corner --speed 3", "No such option")])
+                                                       (2, "run peg_corner --speed 3", "No such option")])  # fmt: skip
 def test_with_json_an_error_is_an_object_too(status, words, said, answer):
     ended, found = answer(*words.split())
     assert ended == found["status"] == status and said in found["error"]
 
 
-def test_debug_shows_the_traceback(here):
+JSON = {  # of each row in the documents: the status, and a command
+    "run": (0, "run peg_corner --set duration=0.4 --out runs"),
+    "check": (3, "check peg_corner --set contact.stiffness=1e9"), "effects": (0, "effects peg_corner --world ideal"),
+    "certify": (0, "certify runs whole.npz"), "store gc": (0, "store gc runs"), "store again": (0, "store again runs"),
+    "sweep": (0, "sweep two.yaml --workers 1 --out sweeps"), "compare": (0, "compare --only-problems --problems given"),
+    "verify": (0, "verify --impacts 20 --laws kinetic_energy"), "prove": (0, "prove theorem_1"),
+    "reproduce --figure": (0, "reproduce --figure fig02 --out figures"),
+    "live": (0, "live peg_corner --seconds 0.05 --rate 512 --out live"),
+}  # fmt: skip
+
+
+def test_json_has_the_keys_that_the_documents_list(answer, here):
+    found = {}
+    for row, (status, line) in JSON.items():
+        ended, found[row] = answer(*line.split())
+        assert (row, ended, set(found[row])) == (row, status, listed(row))
+    ran, seen = found["run"], answer("inspect", found["run"]["file"], "--impacts", 2)[1]
+    assert len(seen["impacts"]) == min(2, seen["collisions"])
+    assert (seen["end"], seen["steps"]) == (ran["end"], ran["steps"])
+    assert {"energy", "effects", "provenance", "run_key", "content_hash"} <= set(seen)
+    assert found["check"]["limits"]["contacts"] == 2 and found["check"]["warnings"][0]["kind"] == "stiffness"
+    assert found["check"]["warnings"][0].keys() == {"kind", "where", "text"}
+    ignored = {one["name"]: one["ignores"] for one in found["effects"]["effects"]}
+    assert ignored["penalty_stiffness"] == "stiffness"
+    assert found["store again"]["same"] == 1 == len(found["store again"]["files"]) and not found["store gc"]["removed"]
+    assert len(found["sweep"]["points"]) == 2 == found["sweep"]["computed"] and Path(found["sweep"]["table"]).is_file()
+    rows = {row[0]: row for row in found["compare"]["tables"]["given"]["rows"]}
+    assert set(found["compare"]["tables"]) == {"given", "profile"} and "not read" in rows["bad.lcp"]
+    assert rows["two.lcp"].count("solved") > 3 and "solved" not in rows["none.lcp"]  # no z has 0 <= z and -z - 1 >= 0
+    assert found["verify"]["passed"] and [one["law"] for one in found["verify"]["laws"]] == ["kinetic_energy"]
+    assert [one["verdict"] for one in found["prove"]["statements"]] == ["proved"]
+    drawings = found["reproduce --figure"]["drawings"]
+    assert drawings and all(Path(each).is_file() for each in drawings)
+    assert set(answer("store", "repair", "runs")[1]) == {"files", "count", "logs", "aside"}
+    assert answer("store", "check", "runs") == (0, {"files": answer("store", "check", "runs")[1]["files"],
+                                                    "count": {"whole": 1}})  # fmt: skip
+    damaged = Path(ran["file"])
+    damaged.write_bytes(damaged.read_bytes()[:5000])
+    assert answer("store", "check", "runs")[1]["count"] == {"damaged": 1}
+    assert answer("compare", "--export", "ours")[1]["problems"] == len(list(here.glob("ours/*.hdf5"))) > 3
+
+
+def test_debug_shows_the_traceback_ctrl_c_ends_with_130_and_a_fault_of_ours_is_not_hidden(iapb, here, monkeypatch):
     with pytest.raises(SceneError):
         cli.main(["--debug", "run", "wrong.yaml"])
+    raised = [KeyboardInterrupt, ZeroDivisionError]
 
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_ctrl_c_ends_with_130_and_a_fault_of_ours_is_not_hidden(error, iapb, monkeypatch):
     def stopped(**_):
-        raise error
+        raise raised.pop(0)
 
     monkeypatch.setattr("reports.commands.schema.scene_schema", stopped)
-    if error is ZeroDivisionError:
-        with pytest.raises(error):
-            iapb("schema")
-    else:
-        assert iapb("schema") == (130, "", "iapb: stopped; files that were complete stay\n")
+    assert iapb("schema") == (130, "", "iapb: stopped; files that were complete stay\n")
+    with pytest.raises(ZeroDivisionError):
+        iapb("schema")
 
 
 @pytest.mark.parametrize("of_ctrl_c", [signal.SIG_DFL, signal.SIG_IGN], ids=["in front", "in the background"])
@@ -212,26 +249,12 @@ def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(of_ctrl_c, 
     assert process.returncode == 130 and "Stopped: interrupted" in out and len(list(tmp_path.glob("*.h5"))) == 2
 
 
-def loaded_by(words):
-    """Names of the modules that a command loads, in a process of its own."""
-    code = f"import sys; from reports.cli import main; main({words!r}); print('LOADED', *sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    text, loaded = done.stdout.split("LOADED")
-    return text, loaded.split()
-
-
-def test_help_loads_nothing_heavy_and_a_run_no_verification_nor_solver(tmp_path):
-    text, loaded = loaded_by(["--help"])
-    assert not HEAVY & {name.partition(".")[0] for name in loaded} and all(command in text for command in cli.COMMANDS)
-    _, loaded = loaded_by(["run", *SHORT, "--out", str(tmp_path)])
-    assert not [name for name in loaded if name.startswith(("verification", "reference.complementarity"))]
-
-
-@pytest.mark.parametrize("command", cli.COMMANDS)
-def test_every_command_explains_itself_in_the_words_of_the_list(command, iapb):
-    status, out, _ = iapb(command, "--help")
-    explained = getattr(import_module(f"reports.commands.{command}"), command).__doc__
-    assert status == 0 and "Usage" in out and explained.partition("\n")[0] == cli.COMMANDS[command]
+def test_every_command_explains_itself_in_the_words_of_the_list(iapb):
+    told = iapb("--help")[1]
+    for command, words in cli.COMMANDS.items():
+        status, out, _ = iapb(command, "--help")
+        explained = getattr(import_module(f"reports.commands.{command}"), command).__doc__
+        assert status == 0 and "Usage" in out and explained.partition("\n")[0] == words and command in told
 
 
 def test_version_scenes_schema_and_completion(iapb, answer, monkeypatch, capsys):
@@ -249,13 +272,11 @@ def test_version_scenes_schema_and_completion(iapb, answer, monkeypatch, capsys)
         assert expected in capsys.readouterr().out.split()
 
 
-def test_run_stores_a_run_a_second_call_reads_it_and_inspect_tells_what_is_in_it(iapb, answer, tmp_path):
+def test_run_stores_a_run_a_second_call_reads_it_and_inspect_tells_what_is_in_it(iapb, tmp_path):
     status, out, _ = iapb("run", *SHORT, "--out", tmp_path)
     [file] = tmp_path.glob("*.h5")
     written = file.stat().st_mtime_ns
     assert status == 0 and "computed in" in out and str(file) in out
-    status, ran = answer("run", *SHORT, "--out", tmp_path)
-    assert status == 0 and set(ran) == listed("run") and Path(ran["file"]) == file
     assert "read from its file" in iapb("run", *SHORT, "--out", tmp_path)[1] and file.stat().st_mtime_ns == written
     for more in (("--set", "contact.stiffness=900"), ("--world", "PB"), ("--rendering", "spread")):
         iapb("run", *SHORT, *more, "--out", tmp_path)
@@ -263,10 +284,6 @@ def test_run_stores_a_run_a_second_call_reads_it_and_inspect_tells_what_is_in_it
     status, out, _ = iapb("inspect", file, "--impacts", "1")
     for text in ("peg_corner", "Complete.", "The first 1 of", "impact_loss", "friction", "run key", "content hash"):
         assert status == 0 and text in out, text
-    status, seen = answer("inspect", file, "--impacts", 2)
-    assert status == 0 and len(seen["impacts"]) == min(2, seen["collisions"])
-    assert {name: seen[name] for name in ("end", "steps")} == {name: ran[name] for name in ("end", "steps")}
-    assert {"energy", "effects", "provenance", "run_key", "content_hash"} <= set(seen)
 
 
 def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(iapb, answer, tmp_path, monkeypatch):
@@ -295,14 +312,11 @@ def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(iapb
     assert answer(*wrong)[1]["distrust"] and "not to be trusted" in iapb("inspect", *tmp_path.glob("x/*.h5"))[1]
 
 
-def test_check_warns_with_a_number_and_says_what_a_rigid_world_costs(iapb, answer):
+def test_check_says_what_the_step_holds_and_what_a_rigid_world_costs(iapb, answer):
     status, out, _ = iapb("check", "peg_corner")
     assert status == 0 and "the step holds contact.stiffness <= 2.62e+05 N/m" in out and "Nothing wrong" in out
-    status, found = answer("check", "peg_corner", "--set", "contact.stiffness=1e9")
-    assert status == 3 and set(found) == listed("check") and found["limits"]["contacts"] == 2
-    assert found["warnings"][0].keys() == {"kind", "where", "text"} and found["warnings"][0]["kind"] == "stiffness"
     many = [{"name": f"b{i}", "joint": "planar", "mass": 1.0, "inertia": 1e-3, "position": [0.11 * i, 0.05, 0.0],
-             "shapes": [{"kind": "circle", "radius": 0.05}]} for i in range(330)]
+             "shapes": [{"kind": "circle", "radius": 0.05}]} for i in range(330)]  # fmt: skip
     base = ("wall_1d", "--set", "hand=null", "--set", "device=null", "--set", "couplings={}", "--set", "walls=[]")
     some = (*base, "--set", f"bodies={json.dumps(many[:60])}", "--set", "duration=10")
     remarks = answer("check", *some, "--world", "ideal")[1]["remarks"]
@@ -312,16 +326,8 @@ def test_check_warns_with_a_number_and_says_what_a_rigid_world_costs(iapb, answe
     status, found = answer("check", *every)
     assert status == 3 and "size" in {one["kind"] for one in found["warnings"]}
     assert iapb("run", *every, "--out", "/nonexistent")[0] == 1
-
-
-def test_effects_lists_each_with_its_reason(iapb, answer):
     status, out, _ = iapb("effects", "peg_corner", "--world", "PB")
     assert status == 0 and "the law 'penalty' does not use it" in " ".join(out.split())
-    status, out, _ = iapb("effects", "peg_corner")
-    assert status == 0 and "without it" in out and "Off, because" in out
-    status, found = answer("effects", "peg_corner", "--world", "ideal")
-    assert status == 0 and set(found) == {"scene", "world", "effects"}
-    assert {one["name"]: one["ignores"] for one in found["effects"]}["penalty_stiffness"] == "stiffness"
 
 
 def test_certify_judges_runs_and_archives_and_exports_them_as_integers(iapb, answer, here):
@@ -346,44 +352,22 @@ def test_certify_judges_runs_and_archives_and_exports_them_as_integers(iapb, ans
     assert Path("impacts.txt").read_text(encoding="utf-8").splitlines() == whole and not list(here.glob(".*"))
 
 
-def test_store_checks_repairs_cleans_and_simulates_again(iapb, answer, here):
-    iapb("run", *SHORT, "--out", "runs")
-    assert iapb("store", "check", "notes.md")[:2] == (1, "notes.md: foreign: no file of iapb: no seal, and nothing "
-                                                          "that says so\n1 files: 1 foreign\n")
-    assert answer("store", "check", "runs")[1]["count"] == {"whole": 1}
-    status, found = answer("store", "again", "runs")
-    assert status == 0 and found["same"] == 1 == len(found["files"])
-    assert answer("store", "gc", "runs")[1]["removed"] is False
-    assert set(answer("store", "repair", "runs")[1]) == {"files", "count", "logs", "aside"}
-    damaged = next(here.glob("runs/*.h5"))
-    damaged.write_bytes(damaged.read_bytes()[:5000])
-    status, found = answer("store", "check", "runs")
-    assert status == 1 and found["count"] == {"damaged": 1}
-
 
 def standing_still(mass_matrix, contact_jacobian, velocity, restitution):
     """A resolver that breaks the law of restitution."""
     return 0.0 * velocity
 
 
-def test_verify_tests_a_resolver_and_judges_its_counterexample_again(answer, tmp_path, monkeypatch):
+def test_verify_judges_the_counterexample_of_a_resolver_again_and_prove_says_what_coq_refuses(
+    answer, tmp_path, monkeypatch
+):
     monkeypatch.chdir(ROOT)
-    status, found = answer("verify", "--impacts", 20, "--laws", "kinetic_energy")
-    assert status == 0 and set(found) == listed("verify") and found["passed"]
-    assert [one["law"] for one in found["laws"]] == ["kinetic_energy"]
     again = ("verify", "--full", "--impacts", 20, "--trajectories", 0, "--out", tmp_path)
     status, found = answer(*again, "--resolver", "tests.reports.test_commands:standing_still")
     assert status == 1 and not found["passed"] and set(found) == listed("verify --full")
     assert {one["law"]: one["failures"] > 0 for one in found["laws"]["impacts"]}["restitution"]
     status, found = answer("verify", "--recheck", found["counterexamples"][0], "--allow-code")
     assert status == 1 and not found["passed"] and not found["laws"][0]["passed"]
-
-
-def test_prove_prints_a_proof_and_says_what_coq_refuses(iapb, answer, monkeypatch):
-    status, out, _ = iapb("prove", "theorem_1")
-    assert status == 0 and "proved" in out
-    status, found = answer("prove", "theorem_1")
-    assert set(found) == listed("prove") and [one["verdict"] for one in found["statements"]] == ["proved"]
     refused = Theorem("sign_kept", "yes", ("an_axiom_of_its_own",))
     monkeypatch.setattr("reports.commands.prove.theorems", lambda: (refused,))
     monkeypatch.setattr("reports.commands.prove.all_proofs", lambda: ())
@@ -394,39 +378,24 @@ def test_prove_prints_a_proof_and_says_what_coq_refuses(iapb, answer, monkeypatc
 
 def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, monkeypatch):
     choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
-    asked = []
-    monkeypatch.setattr("reports.commands.bench.which_method", lambda *given: asked.append(given) or (choice,))
+    tables, asked = {"one": Table((Column("x"),), ((1,),))}, []
+    findings = [Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)]
+    for name, stand_in in (("which_method", lambda *given: asked.append(given) or (choice,)),
+                           ("haptic_study", lambda *_: findings[-1]), ("choices", lambda _: Table(())),
+                           ("work_precision", lambda **_: Table((Column("y"),), ((2,),)))):
+        monkeypatch.setattr(f"reports.commands.bench.{name}", stand_in)
     status, found = answer("bench", "--budget", "50us", "--contacts", "7", "--coordinates", "3")
     assert asked == [(pytest.approx(5e-5), 7, 3)]
     assert status == 0 and found["choices"][0]["method"] == "factored"
-    tables = {"one": Table((Column("x"),), ((1,),))}
-    finding = Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)
-    monkeypatch.setattr("reports.commands.bench.haptic_study", lambda *_: finding)
-    monkeypatch.setattr("reports.commands.bench.work_precision", lambda **_: Table((Column("y"),), ((2,),)))
-    monkeypatch.setattr("reports.commands.bench.choices", lambda _: Table(()))
     status, found = answer("bench")
-    monkeypatch.setattr("reports.commands.bench.haptic_study", lambda *_: with_failures(finding, [FAILED]))
-    assert "Not computed: four contacts: SolverError: no solution" in iapb("bench")[1] and answer("bench")[0] == 1
-    monkeypatch.setattr("reports.commands.bench.haptic_study", lambda *_: finding)
-    assert status == 0 and set(found) == listed("bench")
+    assert status == 0 and set(found) == listed("bench") and "• as asked for: s" in iapb("bench")[1]
     assert found["tables"] == {"one": [{"x": 1}], "methods on problems": [{"y": 2}]}
-    assert "• as asked for: s" in iapb("bench")[1]
-
-
-def test_reproduce_draws_one_figure(answer, tmp_path):
-    status, found = answer("reproduce", "--figure", "fig02", "--out", tmp_path)
-    assert status == 0 and found["drawings"] and all(Path(each).is_file() for each in found["drawings"])
-
-
-def test_sweep_computes_every_point(answer, tmp_path):
-    (tmp_path / "two.yaml").write_text(STUDY, encoding="utf-8")
-    status, found = answer("sweep", tmp_path / "two.yaml", "--workers", 1, "--out", tmp_path / "sweeps")
-    assert status == 0 and set(found) == listed("sweep")
-    assert len(found["points"]) == 2 == found["computed"] and Path(found["table"]).is_file()
+    findings.append(with_failures(findings[0], [FAILED]))
+    assert "Not computed: four contacts: SolverError: no solution" in iapb("bench")[1] and answer("bench")[0] == 1
 
 
 @pytest.mark.parametrize("device", [(), ("--device", "simulated", "--no-budget")], ids=str)
-def test_live_says_how_it_kept_to_the_clock_and_what_it_stored_can_be_done_again(iapb, answer, tmp_path, device):
+def test_live_says_how_it_kept_to_the_clock_and_what_it_stored_can_be_done_again(iapb, tmp_path, device):
     status, out, _ = iapb("live", "peg_corner", "--seconds", "0.1", "--set", "bodies.peg.velocity=[-0.3,0.4,0]",
                           "--out", tmp_path, *device)  # fmt: skip
     for text in ("100 ticks at 1000 Hz", "A tick's work took", "It began late by", "deadline", "collision"):
@@ -438,8 +407,6 @@ def test_live_says_how_it_kept_to_the_clock_and_what_it_stored_can_be_done_again
     assert stored.device == ("iapb.haptics.device:SimulatedDevice" if device else "")
     assert np.all(np.diff(stored.timetable.due) >= 1e-3 - 1e-9)
     assert content_hash(replay(stored)) == content_hash(stored.run)
-    status, found = answer("live", "peg_corner", "--seconds", 0.05, "--rate", 512, "--out", tmp_path)
-    assert status == 0 and {"ticks", "missed", "run", "timetable", "stopped"} <= set(found)
 
 
 def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb, here):
@@ -465,20 +432,6 @@ def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb,
     assert [row[0] for row in found["tables"]["worlds"]["rows"]] == ["IAPB", "ideal", "ideal-friction"]
     picture = place.with_suffix(".svg").read_text(encoding="utf-8")
     assert "ideal-friction (reference)" in picture and "penetration [mm]" in picture
-
-
-def test_compare_lists_problem_files_with_who_did_not_solve_them(iapb, answer, here):
-    Path("given").mkdir()
-    Path("given/two.lcp").write_text("2\n2 1\n1 2\n-5 -6\n")
-    Path("given/bad.lcp").write_text("2\nno number\n")
-    Path("given/none.lcp").write_text("1\n-1\n-1\n")  # 0 <= z, −z − 1 >= 0: no z
-    status, out, _ = iapb("compare", "--only-problems", "--problems", "given")
-    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line[:4] in ("two.", "none", "bad.")}
-    assert status == 0 and max(map(len, out.splitlines())) <= show.WIDTH
-    assert int(rows["two.lcp"][2]) > 3 and rows["none.lcp"][2] == "0" and rows["bad.lcp"][3:5] == ["not", "read:"]
-    stored = json.loads(Path("out/compare/problems.json").read_text(encoding="utf-8"))
-    assert set(stored) == listed("compare") and set(stored["tables"]) == {"given", "profile"}
-    assert answer("compare", "--export", "ours")[1]["problems"] == len(list(here.glob("ours/*.hdf5"))) > 3
 
 
 def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():

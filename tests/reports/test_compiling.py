@@ -1,7 +1,5 @@
 """Compiling is told when it happens, and only then; a run's times are those of its steps."""
 
-from __future__ import annotations
-
 import multiprocessing
 
 import numba

@@ -1,17 +1,13 @@
 """The stages of the evidence: stored once, read as they were; what fails costs one row or one stage, and is named."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -29,13 +25,13 @@ from reports.provenance import UNKNOWN, dispatched, linear_algebra, this_machine
 from reports.report import keep_answer, kept_answer, report_key
 from reports.runner import Runner
 from reports.store import keys
-from tests.reports.joined import joined
+from tests.reports.made_up import joined
 from verification.claims import arm
 from verification.cost import effects
-from verification.finding import NOT_COMPUTED, VERDICTS, Failure, Finding, Part, failure_of, finding_of
+from verification.finding import NOT_COMPUTED, VERDICTS, Finding, Part, failure_of, finding_of
+from verification.proofs import all_proofs
 from verification.table import Column, Table
 
-Patch = pytest.MonkeyPatch
 ANY = (None, math.nan, math.inf, -math.inf, -0.0, 0.1, 5e-324, 3, -(2**53) - 1, 2**70, True, False,
        "", "é", "nan", "True", "None", np.float32(0.5), np.int64(3), np.bool_(True))  # fmt: skip
 FINDING = finding_of(
@@ -47,16 +43,16 @@ FINDING = finding_of(
      "empty": Table((Column("row"),)), "bare": Table(())})  # fmt: skip
 
 
-def nothing(*_: Any) -> None:
+def nothing(*_):
     """No progress."""
 
 
-def filled(folder: Path, compute: Callable[..., Any], kind: Any = Finding, name: str = "mechanics") -> Stage:
+def filled(folder, compute, kind=Finding, name="mechanics"):
     return Stage(folder / "tables", name, kind, "quick").fill(Runner(folder / "runs"), compute)
 
 
-def test_records_are_computed_once_and_come_back_with_every_type(tmp_path: Path) -> None:
-    calls: list[int] = []
+def test_records_are_computed_once_and_come_back_with_every_type(tmp_path):
+    calls = []
     table = Table((Column("a/b", "m"), Column("row")), tuple((cell, 0) for cell in ANY))
     for kind, records in ((Finding, FINDING), (Table, table)):
         first, again = (filled(tmp_path, lambda _, own=records: calls.append(1) or own, kind, kind.__name__)
@@ -66,10 +62,10 @@ def test_records_are_computed_once_and_come_back_with_every_type(tmp_path: Path)
     assert len(calls) == 2 and len(list((tmp_path / "tables").glob("*.h5"))) == 2
 
 
-def test_a_stage_that_is_read_lists_the_runs_of_the_one_that_made_them(tmp_path: Path) -> None:
+def test_a_stage_that_is_read_lists_the_runs_of_the_one_that_made_them(tmp_path):
     scene = load_scene(find_scene("peg_corner")).with_values({"duration": 0.4})
 
-    def compute(failures: list[Failure]) -> Finding:
+    def compute(failures):
         runner(scene, "IAPB")
         runner.user = "C07"
         runner(scene, "PB")
@@ -85,12 +81,9 @@ def test_a_stage_that_is_read_lists_the_runs_of_the_one_that_made_them(tmp_path:
     assert {run.made_on for run in read.runs.values()} == {this_machine()}
 
 
-def test_every_claim_is_checked_by_astage_of_the_report() -> None:
+def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path, monkeypatch):
     stages_of_claims = {topics.stage_of(claim) for claim in verification.claims.CLAIMS}
     assert stages_of_claims == set(topics.CLAIM_STAGES) <= set(topics.plans())
-
-
-def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setattr(depends, "BESIDE", tmp_path)
     found = [depends.depends_of("complementarity")]
     for text in ("one", "two"):
@@ -109,23 +102,21 @@ def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path: Pat
     assert keys.evidence_version.__wrapped__() not in versions
 
 
-def test_another_blas_kernel_or_numpy_code_is_another_machine_and_other_threads_are_not() -> None:
+def test_another_blas_kernel_or_numpy_code_is_another_machine_and_other_threads_are_not():
     """Asked of the libraries themselves, as a user would choose other code."""
     if "openblas" not in linear_algebra() or dispatched() in (UNKNOWN, "baseline"):
         pytest.skip("numpy has another BLAS than OpenBLAS, or no optional code for this processor")
-    said = []
-    for chosen in ({"OPENBLAS_CORETYPE": "Prescott"}, {"OPENBLAS_CORETYPE": "Haswell"},
-                   {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"},
-                   {"NPY_DISABLE_CPU_FEATURES": dispatched()}):  # fmt: skip
-        program = "from reports.provenance import this_machine; print(this_machine())"
-        done = subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[2], text=True, check=True,
-                              capture_output=True, env={**os.environ, **chosen})  # fmt: skip
-        said.append(done.stdout.strip())
+    program = "from reports.provenance import this_machine; print(this_machine())"
+    said = [subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[2], text=True, check=True,
+                           capture_output=True, env={**os.environ, **chosen}).stdout.strip()
+            for chosen in ({"OPENBLAS_CORETYPE": "Prescott"}, {"OPENBLAS_CORETYPE": "Haswell"},
+                           {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"},
+                           {"NPY_DISABLE_CPU_FEATURES": dispatched()})]  # fmt: skip
     assert said[0] != said[1] == said[2] and "numpy baseline" in said[3]
 
 
-def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path: Path) -> None:
-    def interrupted(failures: list[Failure]) -> Finding:
+def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path):
+    def interrupted(failures):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -141,14 +132,14 @@ def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path: Path
     assert damaged.records is None and damaged.failures[0].error == "RunFileError"
 
 
-def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until_then(tmp_path: Path) -> None:
-    def compute(failures: list[Failure]) -> tuple[str, ...]:
+def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until_then(tmp_path):
+    def compute(failures):
         calls.append(1)
         if len(calls) == 1:
             failures.append(failure_of("two", ValueError("planted")))
         return ("one", "two")[: len(calls)]
 
-    calls: list[int] = []
+    calls = []
     for expected in (("one",), ("one", "two"), ("one", "two")):
         stage = filled(tmp_path, compute, tuple[str, ...])
         failed = gather.failed_cases(tmp_path / "tables", {stage.name: stage.failures})
@@ -157,23 +148,23 @@ def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until
     assert len(calls) == 2 and not list(tmp_path.rglob("*incomplete*")) and not list(tmp_path.rglob("*failed*"))
 
 
-def test_a_stage_computed_in_a_process_is_that_of_this_process_and_tells_its_progress(
-    tmp_path: Path, monkeypatch: Patch
-) -> None:
+def test_a_stage_computed_in_a_process_is_that_of_this_process_and_tells_its_progress(tmp_path, monkeypatch):
     name, said = "proofs", []
     plan = topics.plans()[name]
     monkeypatch.setattr(gather, "plans", lambda: {name: plan})
     monkeypatch.setattr(gather, "_figure_runs", os.path.exists)  # which simulates nothing
+    monkeypatch.setattr(gather.batches, "cores", lambda: 1)
     made = {name: Stage(tmp_path / "tables", name, plan.kind, "quick")}
     gather._compute_beside(made, tmp_path, "quick", lambda *given: said.append(given))
-    assert made[name].records == plan.compute(Runner(tmp_path / "runs"), "quick", nothing, [])
+    read = Stage(tmp_path / "tables", name, plan.kind, "quick").fill(Runner(tmp_path / "runs"), pytest.fail)
+    assert made[name].records == read.records and {record.name for record in read.records} == set(all_proofs())
     assert said[0] == (name, 0, len(made[name].records)) and said[-1] == (name, 1, 1)
 
 
-def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path: Path, monkeypatch: Patch) -> None:
-    raised: list[type[BaseException]] = [RuntimeError, KeyboardInterrupt]
+def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypatch):
+    raised = [RuntimeError, KeyboardInterrupt]
 
-    def compute(*_: object) -> Finding:
+    def compute(*_):
         raise raised.pop(0)("the disk went away\nand more")
 
     monkeypatch.setattr(gather, "plans", lambda: {"engines": Plan(Finding, compute)})
@@ -186,11 +177,11 @@ def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path: Path, mo
         gather._fill(again, Runner(tmp_path / "runs"), "quick", nothing)
 
 
-def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[..., Any]:
+def broken(original, here):
     """`original`, which raises where `here` is true of its arguments."""
 
     @wraps(original)
-    def call(*arguments: Any, **options: Any) -> Any:
+    def call(*arguments, **options):
         if here(*arguments):
             raise ZeroDivisionError("planted")
         return original(*arguments, **options)
@@ -198,7 +189,7 @@ def broken(original: Callable[..., Any], here: Callable[..., bool]) -> Callable[
     return call
 
 
-def of_claims(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+def of_claims(patch, folder, failures):
     """One trial of C07, and all of C01."""
     chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
     chosen["C01"] = replace(chosen["C01"], cases=broken(chosen["C01"].cases, lambda study: True))
@@ -210,7 +201,7 @@ def of_claims(patch: Patch, folder: Path, failures: list[Failure]) -> None:
     assert len(second.tables["C07"].rows) == 2 * len(arm.PLACES) * len(arm.ANGLES) - 2
 
 
-def of_effects(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+def of_effects(patch, folder, failures):
     patch.setattr(effects, "scene_names", lambda: ("peg_corner", "arm_pushing"))
     patch.setattr(effects, "load_scene", broken(effects.load_scene, lambda path: path.stem == "arm_pushing"))
     impulses = effects.LEFT_OUT["impulses"]
@@ -220,30 +211,27 @@ def of_effects(patch: Patch, folder: Path, failures: list[Failure]) -> None:
     assert list(found) == ["peg_corner"] and changes.pop("impulses") is None and None not in changes.values()
 
 
-def of_runs(patch: Patch, folder: Path, failures: list[Failure]) -> None:
+def of_runs(patch, folder, failures):
     patch.setattr(runs, "FIGURE_RUNS", {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "hole/IAPB")})
     patch.setattr(runs, "shipped_scene", broken(runs.shipped_scene, lambda name, values: name == "peg_hole"))
     assert list(runs.figure_runs(Runner(folder), nothing, failures)) == ["corner/IAPB"]
 
 
-STAGES = {
-    of_claims: ["C01", "C07, slender rods, 0.0, 0.1", "C07, point masses at the tips, 0.0, 0.1"],
-    of_effects: ["peg_corner, impulses", "arm_pushing"], of_runs: ["hole/IAPB"],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.__name__)
-def test_a_case_that_raises_costs_its_row_only(stage: Callable[..., None], monkeypatch: Patch, tmp_path: Path) -> None:
-    failures: list[Failure] = []
+@pytest.mark.parametrize(("stage", "failed"), [
+    (of_claims, ["C01", "C07, slender rods, 0.0, 0.1", "C07, point masses at the tips, 0.0, 0.1"]),
+    (of_effects, ["peg_corner, impulses", "arm_pushing"]), (of_runs, ["hole/IAPB"]),
+])  # fmt: skip
+def test_a_case_that_raises_costs_its_row_only(stage, failed, monkeypatch, tmp_path):
+    failures = []
     stage(monkeypatch, tmp_path, failures)
-    assert [failure.case for failure in failures] == STAGES[stage]
+    assert [failure.case for failure in failures] == failed
 
 
-def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch: Patch, tmp_path: Path) -> None:
-    def fails(_inputs: object) -> Figure:
+def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch, tmp_path):
+    def fails(_inputs):
         raise ValueError("planted")
 
-    def draws(_inputs: object) -> Figure:
+    def draws(_inputs):
         return Figure("whole", "", "A figure", "caption", (Panel("<svg />", "alt"),))
 
     path = str(tmp_path / "tables" / "claims-failed.txt")
@@ -264,7 +252,7 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch: 
     assert not (tmp_path / "tables" / "answer.json").exists()  # the next call tries again
 
 
-def test_an_unchanged_report_keeps_its_answer_and_a_changed_one_does_not(tmp_path: Path) -> None:
+def test_an_unchanged_report_keeps_its_answer_and_a_changed_one_does_not(tmp_path):
     (tmp_path / "tables").mkdir()
     for name in ("report.html", "runs.h5"):
         (tmp_path / name).write_text(name)

@@ -1,14 +1,11 @@
 """The pages: whole, self-contained, honest about what is missing, and of one voice."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 from zipfile import ZipFile
 
 import pytest
@@ -17,7 +14,7 @@ from iapb.errors import ArgumentError
 from reports import report
 from reports.figures.figure import Figure, Panel, Recipe, cell, grid
 from reports.figures.paper import arm_energies
-from reports.pages.builder import FIRST_PAGE, ROWS_SHOWN, badge_words, build_report, link_across
+from reports.pages.builder import FIRST_PAGE, ROWS_SHOWN, badge_words, build_report, link_across, worst_first
 from reports.pages.first import LIMIT, facts, made_from
 from reports.pages.formulas import prose
 from reports.pages.quantities import contradictions, unsaid
@@ -25,24 +22,13 @@ from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import TERMS, explained, readable, terms_of
 from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
-from tests.reports.joined import joined
+from tests.reports.made_up import joined
+from verification import finding
 from verification.claims import CLAIMS
 from verification.claims.conditions import FULL_GRID
 from verification.claims.peg import ALL_THREE, LARGE
-from verification.finding import (
-    BEYOND,
-    MISPRINT,
-    MIXED,
-    NOT_COMPUTED,
-    QUANTITIES,
-    REFUTED,
-    REPRODUCED,
-    WHERE,
-    Finding,
-    Part,
-    finding_of,
-)
-from verification.hard_cases.findings import finding_on, on_hard_cases
+from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding, Part, finding_of
+from verification.hard_cases.findings import STABLE, finding_on, on_hard_cases
 from verification.laws.topic import counterexample, properties
 from verification.region import Region
 from verification.table import table_from, titled
@@ -58,31 +44,31 @@ TABLES = tuple(StoredFile(name, f"tables/{name}-1.h5", "k", "c" * 64, "iapb repr
 class Outline(HTMLParser):
     """What the tests ask of a page: identifiers, links, and tags that were not closed."""
 
-    def __init__(self, page: str) -> None:
+    def __init__(self, page):
         super().__init__()
-        self.ids, self.links, self.open, self.wrong = list[str](), list[str](), list[str](), list[str]()
+        self.ids, self.links, self.open, self.wrong = [], [], [], []
         self.feed(page)
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         given = dict(attrs)
-        self.ids += [str(given["id"])] if given.get("id") else []
-        self.links += [str(given[name]) for name in ("href", "src", "xlink:href") if given.get(name)]
+        self.ids += [given["id"]] if given.get("id") else []
+        self.links += [given[name] for name in ("href", "src", "xlink:href") if given.get(name)]
         self.open += [tag] if tag not in VOID else []
 
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_startendtag(self, tag, attrs):
         self.handle_starttag(tag, attrs)
         self.open = self.open[: -1 if tag not in VOID else None]
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         if not self.open or self.open.pop() != tag:
             self.wrong.append(tag)
 
 
-def one(key: str, *parts: Part, said: str = "a", **more: Any) -> Finding:
+def one(key, *parts, said="a", **more):
     return finding_of(key, key, "q", said, parts, **more)
 
 
-def hard_case(*rows: tuple[Any, ...], title: str = "bar") -> Finding:
+def hard_case(*rows, title="bar"):
     numbers = titled(("method", "outcome", "forward error"), rows)
     details = {"source": "ours", "kind": "impact", "why it is hard": "$0.5$ J", "truth": "exact", "expected": "no gain"}
     return finding_on("bar", title, numbers, details)
@@ -105,16 +91,17 @@ EVIDENCE = Evidence(
                            [("gravity", False, "none in the scene", "", None, None)])},
     provenance={"commit": "abc"}, manifest=(*RUNS, *TABLES),
 )  # fmt: skip
+SKIPPED = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"source": "published problems"})
 
 
 @pytest.fixture(scope="module", params=[Evidence(), EVIDENCE], ids=["empty", "full"])
-def pages(request: pytest.FixtureRequest) -> dict[str, str]:
+def pages(request):
     made = build_report(request.param)
     assert made == build_report(request.param)  # byte for byte
     return made
 
 
-def test_each_page_is_well_formed_asks_for_nothing_and_runs_only_its_own_script(pages: dict[str, str]) -> None:
+def test_each_page_is_well_formed_asks_for_nothing_and_runs_only_its_own_script(pages):
     assert list(pages) == [FIRST_PAGE, *(section.page for section in SECTIONS)]
     outlines = {name.rpartition("/")[2]: Outline(page) for name, page in pages.items()}
     for name, page in pages.items():
@@ -131,22 +118,22 @@ def test_each_page_is_well_formed_asks_for_nothing_and_runs_only_its_own_script(
         assert not re.search(r"\son\w+=|fetch\(|XMLHttpRequest|import\(|eval\(|@import|url\((?!#)", page)
 
 
-def test_a_link_to_an_id_of_no_page_is_an_error() -> None:
+def test_a_link_to_an_id_of_no_page_is_an_error():
     given = {"a.html": '<a href="#x">', "report/b.html": '<p id="x"><a href="#x"><a href="#y">', "c.html": '<p id="y">'}
     assert link_across(given) == {"a.html": '<a href="report/b.html#x">', "c.html": '<p id="y">',
-                                  "report/b.html": '<p id="x"><a href="#x"><a href="../c.html#y">'}
+                                  "report/b.html": '<p id="x"><a href="#x"><a href="../c.html#y">'}  # fmt: skip
     with pytest.raises(KeyError, match="z"):
         link_across({"a.html": '<a href="#z">'})
 
 
-def test_what_was_not_computed_is_said() -> None:
+def test_what_was_not_computed_is_said():
     empty = [section for section in SECTIONS if not section.ready(Evidence())]
     assert joined(Evidence()).count("<p class=\"absent\">Not computed in this run.</p>") == len(empty)
     assert not any("reproduced" in part.split("<body>")[1] for part in build_report(Evidence()).values())
     assert facts(Evidence()) == () and made_from(Evidence()) == ""
 
 
-def test_the_pages_say_what_the_records_say_escaped_counted_and_with_their_sources() -> None:
+def test_the_pages_say_what_the_records_say_escaped_counted_and_with_their_sources():
     page = " ".join(joined(EVIDENCE).split())
     for text in ("KE never rises &lt;b&gt;", "<mfrac>", "1 holds for some quantities and fails for", "; 1 fails.",
                  "Fails in some trials<", "Asked &lt;here&gt;.",
@@ -160,50 +147,47 @@ def test_the_pages_say_what_the_records_say_escaped_counted_and_with_their_sourc
     assert "1 on a processor, run 2" in " ".join(joined(replace(EVIDENCE, manifest=other)).split())
 
 
-def test_hard_cases_are_seen_at_a_glance_and_a_refusal_or_an_empty_table_is_no_number() -> None:
-    skipped = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"source": "published problems"})
+def test_hard_cases_are_seen_at_a_glance_and_a_refusal_or_an_empty_table_is_no_number():
     case = hard_case(("factored", "stable", 1e-16), ("gram", "refused", None))
-    page = joined(Evidence(hard_cases=(case, skipped), topics=(on_hard_cases(()),)))
+    page = joined(Evidence(hard_cases=(case, SKIPPED), topics=(on_hard_cases(()),)))
     for text in ('<span class="good">✓</span>&nbsp;factored: stable', '<span class="bad">✕</span>&nbsp;gram: refused',
                  "1 of 2 stable", "Skipped: needs bowl.lcp.", "0 of 0 hard cases"):
         assert text in page, text
     stable = hard_case(("IAPB", "stable", 0.0))
     found = on_hard_cases((stable, hard_case(("IAPB", "gains energy", 0.5), title="stiff wall")))
     assert found.verdict == MIXED and "1 of 2" in found.answer and "“stiff wall” (gains energy)" in found.answer
-    assert "1 cases were skipped" in on_hard_cases((stable, skipped)).answer
+    assert "1 cases were skipped" in on_hard_cases((stable, SKIPPED)).answer
+    calm, others, ours = (finding_on(name, name, table_from([{"method": "factored", "outcome": own}, {
+        "method": "svd", "outcome": other}]), {}) for name, own, other in (
+            ("calm", STABLE, STABLE), ("others", STABLE, "refused"), ("ours", "wrong motion", STABLE)))  # fmt: skip
+    assert worst_first([SKIPPED, calm, others, ours]) == [ours, others, calm, SKIPPED]
 
 
 @pytest.mark.parametrize(("text", "shown"), [
     ("at most 2.0e-16 of it", "at most 2.0 · 10<sup>−16</sup> of it"), ("1e8", "10<sup>8</sup>"),
     ("0.0e+00", "0"), ("-3e+00", "−3"), ("e in [-1, 1]", "e in [−1, 1]"), ("2005-06", "2005-06"),
     ("key a1e5b", "key a1e5b"), ("p >= 0 <= q", "p ≥ 0 ≤ q"), ("costs 5$ <i>", "costs 5$ &lt;i&gt;"),
-])
-def test_powers_of_ten_read_as_people_write_them(text: str, shown: str) -> None:
+])  # fmt: skip
+def test_powers_of_ten_read_as_people_write_them(text, shown):
     assert str(prose(text)).replace("\u202f", " ") == shown
 
 
-def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_table_is_a_table() -> None:
+def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_table_is_a_table():
     panel = Panel(grid(("a",), {"row": [cell("x")]}), 'says "x"')
     drawn = Figure("t", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
     page = build_report(Evidence(manifest=RUNS), [Recipe("t", "", "", (), lambda _: drawn, "accuracy")])
     assert '<table aria-label="says &#34;x&#34;" class="grid' in page["report/accuracy.html"]
     said = 'Data: <a href="manifest.html#runs-C10">C10</a>, a table. To compute it again: <code>iapb reproduce --fig'
     assert said in page["report/accuracy.html"] and "&lt;table" not in page["report/accuracy.html"]
-
-
-def test_a_long_table_is_cut_and_says_where_the_rest_is() -> None:
     rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))
-    for shown, told in ((rows, True), (rows[:-1], False)):
+    for shown, told in ((rows, True), (rows[:-1], False)):  # a long table is cut, and says where the rest is
         page = joined(Evidence(topics=(one("mechanics", tables={"trees": titled(("x",), shown)}),)), ())
         assert (f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} lines" in page) == told
         assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
 
 
-def test_pages_are_written_whole_with_their_archive_and_too_large_ones_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    given = {FIRST_PAGE: "<html>", "report/idea.html": "<p>"}
-    archives = []
+def test_pages_are_written_whole_with_their_archive_and_too_large_ones_are_refused(tmp_path, monkeypatch):
+    given, archives = {FIRST_PAGE: "<html>", "report/idea.html": "<p>"}, []
     for _ in range(2):
         target = write_report(tmp_path / "out", given)
         archives.append((target.parent / ARCHIVE_NAME).read_bytes())
@@ -221,7 +205,7 @@ def test_pages_are_written_whole_with_their_archive_and_too_large_ones_are_refus
     assert not (tmp_path / "new").exists()
 
 
-def test_each_page_lists_the_terms_that_it_uses_and_no_others(pages: dict[str, str]) -> None:
+def test_each_page_lists_the_terms_that_it_uses_and_no_others(pages):
     """The wanted terms are those of the text without the list, and those of the meanings that this adds."""
     for name, page in pages.items():
         lists = re.findall(r'<details class="numbers terms">.*?</details>', page, flags=re.S)
@@ -236,11 +220,13 @@ def test_each_page_lists_the_terms_that_it_uses_and_no_others(pages: dict[str, s
 # The first page
 
 
-def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_topic_with_an_answer() -> None:
+def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_topic_with_an_answer():
     held = [Part("s.", REPRODUCED, f"part {n}", 5, 5) for n in range(9)]
     worst = Part("s.", REFUTED, "the one that fails", 1, 40, 7, named="a quantity")
-    printed, ours = Part("s.", REFUTED, "formula", role=MISPRINT), Part("s.", REFUTED, "more", role=BEYOND)
-    where = Part("s.", WHERE, "part in a region", 30, 40, region=Region((("tilt", "rad", None, 0.015),), share=0.05))
+    printed = Part("s.", REFUTED, "formula", role=finding.MISPRINT)
+    ours = Part("s.", REFUTED, "more", role=finding.BEYOND)
+    region = Region((("tilt", "rad", None, 0.015),), share=0.05)
+    where = Part("s.", finding.WHERE, "part in a region", 30, 40, region=region)
     topics = (one("mechanics", Part("a", REPRODUCED), Part("b", REFUTED), said="Most hold."), one("engines", said=""))
     page = joined(Evidence(claims=(one("C20", *held, where, worst, printed, ours),), topics=topics), ())
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
@@ -253,7 +239,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     assert badge_words(topics[0]) == "1 of 2 findings fail" and badge_words(one("p", Part("a", REFUTED))) == "fails"
 
 
-def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None:
+def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop():
     claim = CLAIMS["C10"]
     near, far = {"IAPB": 1e-5, "PB": 1e-4, "CBuc": 1e-4}, {"IAPB": 1e-3, "PB": 1e-4, "CBuc": 1e-4}
     rows = [start.row() | (near if start.tilt <= 0.015 else far) | {
@@ -273,25 +259,25 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop() -> None
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
 
 
-def told(*claims: Finding, topics: tuple[Finding, ...] = ()) -> dict[str, str]:
+def told(*claims, topics=()):
     """The lines of the first screen by label."""
     return {fact.label: fact.text for fact in facts(Evidence(claims=claims, topics=topics))}
 
 
-def test_the_answer_is_made_from_the_claims() -> None:
+def test_the_answer_is_made_from_the_claims():
     rows = ((LARGE, "x", 10.0, 1.0), (LARGE, "y", 6.0, 2.0), (LARGE, "x", 8.0, 1.0), (LARGE, "theta", 1.0, 1.0))
     forces = one("C11", tables={"C11": titled(("part", "coordinate", "IAPB", "PB"), rows)})
     clipped = ((0.3, "x", 1.0, 1.0), (1.0, "x", 4.0, 1.0), (1.0, "y", 2.0, 1.0), (1.0, "theta", 9.0, 1.0))
     table = titled(("force_limit", "coordinate", "IAPB", "PB"), clipped).judged(lambda row: True)
-    x, turned = Part("s.", WHERE, "x", 40, 40), Part("s.", REFUTED, "theta", 1, 40, named="rotation")
-    ours = Part("s.", REFUTED, "x, larger", 0, 9, role=BEYOND)
+    x, turned = Part("s.", finding.WHERE, "x", 40, 40), Part("s.", REFUTED, "theta", 1, 40, named="rotation")
+    ours = Part("s.", REFUTED, "x, larger", 0, 9, role=finding.BEYOND)
     said = told(one("C10", x, turned, ours), forces, one("C14", tables={"C14": table}))
     assert "8 times as large if the device can give any force (median of 3 cases), and 3 times" in said["Holds"]
     assert "in 40 of 40 in x, 1 of 40 in rotation." in said["Fails"] and "of 9" not in said["Fails"]
     assert "in 40 of 40 in x." in told(one("C10", x, ours))["Holds"]
 
 
-def test_small_tilts_hold_only_if_every_start_that_can_tell_does() -> None:
+def test_small_tilts_hold_only_if_every_start_that_can_tell_does():
     claim = CLAIMS["C10"]
     near, far = ({"IAPB": ours, "PB": 1e-4, "CBuc": 1e-4} for ours in (1e-5, 1e-3))
     for lost, label in ((0, "Holds"), (1, "Fails")):
@@ -302,7 +288,7 @@ def test_small_tilts_hold_only_if_every_start_that_can_tell_does() -> None:
         assert "at most 0.86°, impulses bring" in said[label] and f"x in {24 - lost} of 24" in said[label]
 
 
-def test_the_first_screen_names_our_failures_the_gravest_first_and_what_is_fast() -> None:
+def test_the_first_screen_names_our_failures_the_gravest_first_and_what_is_fast():
     def topic(key: str, verdict: str, *misses: str) -> Finding:
         return one(key, Part("p.", verdict), *(Part("q.", verdict, miss=miss) for miss in misses))
 
@@ -321,13 +307,13 @@ def test_the_first_screen_names_our_failures_the_gravest_first_and_what_is_fast(
 # Quantities that several pages quote
 
 
-def growth(key: str, value: str = "1.24", verdict: str = MIXED) -> Finding:
+def growth(key, value="1.24", verdict=MIXED):
     """A topic of one sentence with one quantity, which its answer repeats."""
     said, given = f"Time of a step grows as the number of bodies to {value}.", ((BODIES, value),)
     return one(key, Part(said, verdict, quantities=given), said=said, quantities=given)
 
 
-def test_a_second_value_or_verdict_of_any_finding_is_noticed() -> None:
+def test_a_second_value_or_verdict_of_any_finding_is_noticed():
     told = [growth("mechanics"), growth("haptic-rate"), growth("engines")]
     assert contradictions(Evidence(topics=tuple(told))) == {}
     for other, found in ((growth("engines", "1.29"), {BODIES: ("1.24", "1.29")}),
@@ -338,7 +324,7 @@ def test_a_second_value_or_verdict_of_any_finding_is_noticed() -> None:
         assert contradictions(Evidence(topics=tuple(told), claims=(other,))) == found
 
 
-def test_a_quantity_is_part_of_its_sentence() -> None:
+def test_a_quantity_is_part_of_its_sentence():
     said = "It grows with the power 1.24; of 11.24 and 1.245 nothing is said."
     assert Part(said, MIXED, quantities=((BODIES, "1.24"),)).sentence == said
     with pytest.raises(ArgumentError, match="is part of"):
@@ -347,11 +333,11 @@ def test_a_quantity_is_part_of_its_sentence() -> None:
         Part("1", MIXED, quantities=(("exponent of bodys", "1"),))
 
 
-def test_a_quantity_that_is_not_quoted_is_named_and_the_time_of_a_step_is_on_the_first_page() -> None:
+def test_a_quantity_that_is_not_quoted_is_named_and_the_time_of_a_step_is_on_the_first_page():
     steps = table_from([{"scene": "peg_corner", "step [µs]": 0.4444}])
     given = (("speed targets", "14 of 18"),)
     rate = one("haptic-rate", Part("p.", MIXED), said="14 of 18 speed targets met.", quantities=given)
     evidence = Evidence(topics=(rate,), inputs={"effect_steps": steps})
-    assert set(unsaid(evidence)) == set(QUANTITIES) - {"time of a peg step", "speed targets"}
+    assert set(unsaid(evidence)) == set(finding.QUANTITIES) - {"time of a peg step", "speed targets"}
     said = "A step of the peg that moves into the corner takes 0.44 µs; a loop at 1 kHz allows 1000 µs. 14 of 18"
     assert said in build_report(evidence, ())[FIRST_PAGE]

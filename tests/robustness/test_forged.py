@@ -1,10 +1,12 @@
-"""Files made to exhaust memory, crash a library or mislead; each is refused in one sentence, in little memory."""
+"""Files of others, made to exhaust memory, crash a library, mislead, show other files or order a terminal about.
 
-from __future__ import annotations
+Each is refused in one sentence, in little memory and time.
+"""
 
 import io
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -13,40 +15,39 @@ import sys
 import time
 import zipfile
 import zlib
-from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
-from iapb import certify_impacts, load_scene
+from iapb import certify_impacts
 from iapb.errors import ArgumentError, IapbError, RunFileError
 from iapb.mechanics.urdf import read_urdf
-from reference.datasets import DatasetError, read_problem
-from reports.cli import main
-from reports.store import RunStore, read_run, write_run
+from reference.datasets import read_problem
+from reports.cli import Harmless, harmless, main
+from reports.store import read_run, write_run
 from reports.store.io import SEAL, mark_store, sealed, write_whole
 from reports.store.parts import Parts
-from tests.robustness.faults import sample_run
-from tests.robustness.inputs import fclib_files, result_files
+from tests.robustness.samples import fclib_files, result_files, sample_run
 
 pytestmark = pytest.mark.thorough
 
 ROOT = Path(__file__).parents[2]
 MOST = 700 << 20  # bytes that a refusal may take beyond what the process had
+SECRET = b"root:x:0:0:a line of a password file that nobody may see\n" * 4
+ORDERS = "\x1b]0;owned\x07\x1b[2J\x9b31m\rfake\x08\u202eevil"
 
 
-def command(*words: Any) -> int:
+def command(*words):
     return main([str(word) for word in words])
 
 
-def apart(*words: Any, act: Callable[..., Any] = command) -> tuple[int, str]:
+def apart(*words, act=command):
     """Run a command line (or `act`) in a process of its own, which may crash; return its status and what it said."""
-    def work(pipe: Any) -> None:
+    def work(pipe):
         said = io.StringIO()
         with redirect_stdout(said), redirect_stderr(said):
             before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -66,7 +67,7 @@ def apart(*words: Any, act: Callable[..., Any] = command) -> tuple[int, str]:
     child.start()
     theirs.close()
     try:
-        answer: tuple[int, str] = ours.recv() if ours.poll(60.0) else (-2, "Traceback: hangs")
+        answer = ours.recv() if ours.poll(60.0) else (-2, "Traceback: hangs")
     except EOFError:
         answer = -3, "Traceback: crashed"
     if child.is_alive():
@@ -75,13 +76,13 @@ def apart(*words: Any, act: Callable[..., Any] = command) -> tuple[int, str]:
     return answer
 
 
-def refused(*words: Any, status: int = 1, act: Callable[..., Any] = command) -> str:
+def refused(*words, status=1, act=command):
     found, said = apart(*words, act=act)
     assert found == status and "Traceback" not in said, (words, found, said[-2000:])
     return said
 
 
-def forged(path: Path, change: Callable[[Any], None]) -> Path:
+def forged(path, change):
     """Write a run, changed by somebody else's program, under a seal that holds."""
     write_run(path, sample_run(), replace=True)
     with h5py.File(path, "r+") as file:
@@ -90,7 +91,29 @@ def forged(path: Path, change: Callable[[Any], None]) -> Path:
     return path
 
 
-def packed_twice(file: Any) -> None:
+def private(file):
+    """Another file of the reader's, which a run file may not show: as text and as HDF5."""
+    path = Path(file.filename).parents[1] / "private.h5"
+    path.with_suffix(".txt").write_bytes(SECRET)
+    with h5py.File(path, "w") as other:
+        other["secret"], other["numbers"] = SECRET.decode(), np.arange(3.0)
+    return str(path)
+
+
+def external_storage(file):
+    del file["trajectory/q"]
+    flat = private(file).replace(".h5", ".txt")
+    file.create_dataset("trajectory/q", (len(SECRET),), "u1", external=[(flat, 0, len(SECRET))])
+
+
+def virtual(file):
+    del file["trajectory/q"]
+    layout = h5py.VirtualLayout((3,), "f8")
+    layout[:] = h5py.VirtualSource(private(file), "numbers", shape=(3,))
+    file.create_virtual_dataset("trajectory/q", layout)
+
+
+def packed_twice(file):
     del file["trajectory/q"]
     made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     made.set_chunk((200 << 17,))
@@ -100,7 +123,7 @@ def packed_twice(file: Any) -> None:
     dataset.write_direct_chunk((0,), zlib.compress(zlib.compress(bytes(200 << 20))))
 
 
-def huge_chunk(file: Any) -> None:
+def huge_chunk(file):
     """Few values stated; a chunk that unpacks to 2 GB."""
     del file["trajectory/q"]
     dataset = file.create_dataset("trajectory/q", (3,), "u1", chunks=(1 << 20,), maxshape=(None,), compression="gzip")
@@ -109,76 +132,66 @@ def huge_chunk(file: Any) -> None:
     dataset.id.write_direct_chunk((0,), content)
 
 
-def deep(file: Any) -> None:
+def deep(file):
     group = file.id
     for _ in range(20_000):
         group = h5py.h5g.create(group, b"g")
 
 
-def a_loop(file: Any) -> None:
-    file["law/again"] = file["/"]
-    file["scene/again"] = file["/"]
+def a_loop(file):
+    file["law/again"] = file["scene/again"] = file["/"]
 
 
-def many_attributes(file: Any) -> None:
-    file.attrs["remarks"] = np.array(["a"] * 3000, h5py.string_dtype())
-
-
-def far_offsets(file: Any) -> None:
+def far_offsets(file):
     file["contacts/offsets"][1:] = 10**12
 
 
-def short(file: Any) -> None:
-    values = file["steps/impulse"][:3]
-    del file["steps/impulse"]
-    file["steps/impulse"] = values
+def replaced(name, value):
+    """Return an attack that puts something else in the place of a part of a run."""
+    def attack(file):
+        new = value(file) if callable(value) else value
+        del file[name]
+        file[name] = new
+
+    return attack
 
 
-def deep_json(file: Any) -> None:
-    del file["scene/resolved"]
-    file["scene/resolved"] = "[" * 100_000
+ATTACKS = {  # by name: the attack, and what the refusal says
+    "external link": (replaced("scene/name", lambda file: h5py.ExternalLink(private(file), "/secret")), "another file"),
+    "linked group": (replaced("scene", lambda file: h5py.ExternalLink(private(file), "/")), "link to another file"),
+    "soft link": (replaced("scene/name", h5py.SoftLink("/law/name")), "soft link"),
+    "external storage": (external_storage, "stored in another file"), "virtual": (virtual, "put together"),
+    "packed twice": (packed_twice, ""), "huge chunk": (huge_chunk, ""), "deep": (deep, ""), "loop": (a_loop, ""),
+    "far offsets": (far_offsets, ""), "short": (replaced("steps/impulse", lambda file: file["steps/impulse"][:3]), ""),
+    "deep JSON": (replaced("scene/resolved", "[" * 100_000), ""),
+    "no scene": (replaced("scene/resolved", '{"name": "x", "bodies": 7}'), ""),
+    "no text": (replaced("scene/name", np.array(b"\xff\xfe\x00\x80", h5py.string_dtype("utf-8", 4))), ""),
+    "two lines": (replaced("scene/name", "peg\nNothing wrong was found."), ""),
+}  # fmt: skip
 
 
-def no_scene(file: Any) -> None:
-    del file["scene/resolved"]
-    file["scene/resolved"] = '{"name": "x", "bodies": 7}'
-
-
-def no_text(file: Any) -> None:
-    del file["scene/name"]
-    file.create_dataset("scene/name", data=np.bytes_(b"\xff\xfe\x00\x80"), dtype=h5py.string_dtype("utf-8", 4))
-
-
-def two_lines(file: Any) -> None:
-    del file["scene/name"]
-    file["scene/name"] = "peg\nNothing wrong was found."
-
-
-def nan_poses(file: Any) -> None:
-    file["trajectory/q"][...] = np.nan
-
-
-ATTACKS = (packed_twice, huge_chunk, deep, a_loop, far_offsets, short, deep_json, no_scene, no_text, two_lines)
-
-
-@pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.__name__)
-def test_a_forged_run_is_refused_by_every_reader(attack: Callable[[Any], None], tmp_path: Path) -> None:
-    mark_store(tmp_path)
-    path = forged(tmp_path / "forged.h5", attack)
-    write_run(tmp_path / "whole.h5", sample_run())
-    for words in (["certify", path], ["store", "again", path], *([["inspect", path]] * (attack is not no_scene))):
-        said = refused(*words)
-        assert said.count("\n") <= 4, said
-    assert "1 of 2" in refused("store", "again", tmp_path)
-    said = refused("certify", tmp_path)
+@pytest.mark.parametrize("name", ATTACKS)
+def test_a_forged_run_is_refused_by_every_reader_and_shows_no_other_file(name, tmp_path):
+    store, (attack, told) = tmp_path / "store", ATTACKS[name]
+    mark_store(store)
+    path = forged(store / "forged.h5", attack)
+    write_run(store / "whole.h5", sample_run())
+    for words in (["certify"], ["store", "again"], *([["inspect"]] * (name != "no scene")),
+                  *([["verify", "--recheck"]] * bool(told))):
+        said = refused(*words, path)
+        assert said.count("\n") <= 4 and told in said and "password" not in said, said
+    assert "1 of 2" in refused("store", "again", store)
+    said = refused("certify", store)
     assert "forged.h5: not certified" in said and "whole.h5: none of" in said
-    refused("store", "check", tmp_path, status=int(attack is not no_scene))
-    refused("store", "repair", tmp_path, status=0)
+    refused("store", "check", store, status=int(name != "no scene"))
+    refused("store", "repair", store, status=0)
 
 
-def test_many_references_to_one_text_are_read_within_the_budget(tmp_path: Path) -> None:
-    path = tmp_path / "texts.h5"
-    write_run(path, sample_run())
+def test_many_references_to_one_text_are_read_within_the_budget_which_can_be_raised_and_lowered(tmp_path):
+    path = write_run(tmp_path / "texts.h5", sample_run())
+    assert read_run(path, budget=1 << 30).steps == sample_run().steps
+    with pytest.raises(RunFileError, match="budget"):
+        read_run(path, budget=100_000)
     with h5py.File(path, "r+") as file:
         texts = file.create_dataset("provenance/many", 60_000, dtype=h5py.string_dtype())
         texts[0] = "x" * 1_000_000
@@ -190,31 +203,34 @@ def test_many_references_to_one_text_are_read_within_the_budget(tmp_path: Path) 
     assert "budget" in refused("inspect", path)
 
 
-@pytest.mark.parametrize("change", [nan_poses, many_attributes])
-def test_what_is_odd_is_read_or_refused(change: Callable[[Any], None], tmp_path: Path) -> None:
-    path = forged(tmp_path / "odd.h5", change)
-    for words in (["inspect", path], ["certify", path], ["store", "again", path]):
-        status, said = apart(*words)
-        assert status in (0, 1) and "Traceback" not in said, said
+def test_what_is_odd_is_read_or_refused(tmp_path):
+    for change in (lambda file: file["trajectory/q"].__setitem__(..., np.nan),
+                   lambda file: file.attrs.update(remarks=np.array(["a"] * 3000, h5py.string_dtype()))):  # fmt: skip
+        path = forged(tmp_path / "odd.h5", change)
+        for words in (["inspect", path], ["certify", path], ["store", "again", path]):
+            status, said = apart(*words)
+            assert status in (0, 1) and "Traceback" not in said, said
 
 
-def test_a_budget_can_be_raised_and_lowered(tmp_path: Path) -> None:
-    path = write_run(tmp_path / "run.h5", sample_run())
-    assert read_run(path, budget=1 << 30).steps == sample_run().steps
-    with pytest.raises(Exception, match="budget"):
-        read_run(path, budget=100_000)
-
-
-def test_fclib_and_npz_cannot_ask_for_any_memory(tmp_path: Path) -> None:
-    for name, size, kind in (("a.hdf5", 4000, "S1000000"), ("b.hdf5", 10**8, "f8")):
-        (tmp_path / name).write_bytes(fclib_files()["local.hdf5"])
-        with h5py.File(tmp_path / name, "r+") as file:
-            del file["fclib_local/vectors/q"]
-            file.create_dataset("fclib_local/vectors/q", (size,), kind)
+def test_problem_files_and_npz_cannot_ask_for_any_memory_nor_show_another_file(tmp_path):
+    (tmp_path / "x").mkdir()
+    changes = {"a": ("vectors/q", {"shape": 4000, "dtype": "S1000000"}, "cannot be read"),
+               "b": ("vectors/q", {"shape": 10**8, "dtype": "f8"}, "cannot be read"),
+               "c": ("info/title", None, "info/title is a link to another file")}  # fmt: skip
+    for name, (part, new, told) in changes.items():
+        path = tmp_path / "x" / f"{name}.hdf5"
+        path.write_bytes(fclib_files()["local.hdf5"])
+        with h5py.File(path, "r+") as file:
+            group = file["fclib_local"]
+            del group[part]
+            if new:
+                group.create_dataset(part, **new)
+            else:
+                group[part] = h5py.ExternalLink(private(file), "/secret")
+        assert told in refused(path, act=read_problem), name
     with h5py.File(tmp_path / "deep.hdf5", "w") as file:
         deep(file)
-    for name in ("a.hdf5", "b.hdf5", "deep.hdf5"):
-        assert "cannot be read" in refused(tmp_path / name, act=read_problem), name
+    assert "cannot be read" in refused(tmp_path / "deep.hdf5", act=read_problem)
     with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         for name in ("mass_matrix", "v_minus", "v_plus"):
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
@@ -223,8 +239,6 @@ def test_fclib_and_npz_cannot_ask_for_any_memory(tmp_path: Path) -> None:
                 for _ in range(100):
                     member.write(bytes(8_000_000))
     assert "unpacks to" in refused("certify", tmp_path / "bomb.npz")
-    os.mkfifo(tmp_path / "pipe.npz")
-    assert "no regular file" in refused("certify", tmp_path / "pipe.npz")
 
 
 @pytest.mark.parametrize(("before", "after"), [
@@ -232,7 +246,7 @@ def test_fclib_and_npz_cannot_ask_for_any_memory(tmp_path: Path) -> None:
     (b"word\0\0\0\0\x1a\0\0\0\0\0\0\0\x08\0", b"word\0\0\0\0\x1a\0\0\0\0\0\0\0\x08\4"),  # a size: a search without end
     (b"DIMENSION_SCALE", b"DIMENSION_\xffCALE"),  # a text that is freed twice
 ])  # fmt: skip
-def test_a_file_that_crashes_hdf5_or_has_no_end_stops_no_reader(before: bytes, after: bytes, tmp_path: Path) -> None:
+def test_a_file_that_crashes_hdf5_or_has_no_end_stops_no_reader(before, after, tmp_path):
     mark_store(tmp_path)
     for name, content in result_files().items():
         (tmp_path / name).write_bytes(sealed(content[:-SEAL].replace(before, after)))
@@ -244,16 +258,21 @@ def test_a_file_that_crashes_hdf5_or_has_no_end_stops_no_reader(before: bytes, a
     assert apart(tmp_path / "run.h5", act=read_run)[0] not in (-2, -3)
 
 
-def test_pipes_and_encodings_are_refused(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.lcp")
-    with pytest.raises(DatasetError, match="no regular file"):
-        read_problem(tmp_path / "pipe.lcp")
-    with pytest.raises(ArgumentError, match="no regular file"):
-        load_scene(tmp_path / "pipe.lcp")
+def test_a_pipe_is_refused_and_not_waited_for_and_odd_encodings_are_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("pipe.h5", "pipe.npz", "pipe.lcp", "pipe.yaml", "arm.urdf"):
+        os.mkfifo(name)
+    Path("scene.yaml").write_text(
+        "{name: s, dimensions: 3, rate: 100, duration: 1, bodies: [], robots: [{name: a, urdf: arm.urdf}]}")
+    for line in ("inspect pipe.h5", "store check pipe.h5", "store again pipe.h5", "verify --recheck pipe.h5",
+                 "run scene.yaml", "run pipe.yaml", "sweep pipe.yaml", "report diff pipe.h5 pipe.h5"):
+        assert refused(*line.split()).count("\n") <= 3, line
+    assert "no regular file" in refused("certify", "pipe.npz")
+    assert "no regular file" in refused("pipe.lcp", act=read_problem)
     for encoding in ("utf-7", "idna", "undefined", "rot13", "utf-32", "punycode", "base64", "no such"):
-        (tmp_path / "arm.urdf").write_text(f"<?xml version='1.0' encoding='{encoding}'?><robot name='r'/>")
+        Path("other.urdf").write_text(f"<?xml version='1.0' encoding='{encoding}'?><robot name='r'/>")
         with pytest.raises(ArgumentError):
-            read_urdf(tmp_path / "arm.urdf")
+            read_urdf("other.urdf")
 
 
 @pytest.mark.parametrize(("matrix", "said"), [
@@ -262,21 +281,19 @@ def test_pipes_and_encodings_are_refused(tmp_path: Path) -> None:
     (np.ma.masked_array(np.eye(2), mask=True), "real numbers"), (np.eye(2) + np.longdouble(1e-18), "finite double"),
     (np.eye(2) * np.longdouble("1e400"), "finite double"),
 ])  # fmt: skip
-def test_impacts_of_no_mass_matrix_are_refused(matrix: Any, said: str) -> None:
+def test_impacts_of_no_mass_matrix_are_refused(matrix, said):
     with pytest.raises(ArgumentError, match=said):
         certify_impacts(matrix, [1.0, 0.0], [-1.0, 0.0])
 
 
-def test_parts_without_their_law_do_not_stop_a_repair(tmp_path: Path) -> None:
+def test_parts_without_their_law_do_not_stop_a_repair(tmp_path):
     mark_store(tmp_path)
-    heads: tuple[dict[str, Any], ...] = ({}, {"scene_resolved": {}, "world": "IAPB"}, {"live": 3})
-    for number, head in enumerate(heads):
+    for number, head in enumerate(({}, {"scene_resolved": {}, "world": "IAPB"}, {"live": 3})):
         Parts(tmp_path / f"{number}.h5.parts", head).close()
-    (tmp_path / "3.h5.parts").mkdir()
     line = b'{"format": "iapb part", "format_version": 1, "number": 0, "arrays": ' + b"[" * 100_000
-    (tmp_path / "3.h5.parts" / "00000000.part").write_bytes(sealed(line))
-    (tmp_path / "4.h5.parts").mkdir()
-    (tmp_path / "4.h5.parts" / "00000000.part").write_bytes(sealed(b'{"format": "iapb part"\xff\n'))
+    for number, content in ((3, line), (4, b'{"format": "iapb part"\xff\n')):
+        (tmp_path / f"{number}.h5.parts").mkdir()
+        (tmp_path / f"{number}.h5.parts" / "00000000.part").write_bytes(sealed(content))
     shutil.copytree(tmp_path / "0.h5.parts", tmp_path / "5.h5.parts")
     os.mkfifo(tmp_path / "5.h5.parts" / "00000001.part")
     said = refused("store", "repair", tmp_path, status=0)
@@ -284,92 +301,38 @@ def test_parts_without_their_law_do_not_stop_a_repair(tmp_path: Path) -> None:
     refused("store", "gc", tmp_path, "--delete", status=0)
 
 
-def strewn(folder: Path) -> int:
-    """Fill a store with 200 foreign and damaged files of every name that ours have; return their number."""
-    run, table = write_run(folder / "ours.h5", sample_run()).read_bytes(), b'{"format": "iapb part"'
-    noted = io.BytesIO()
-    with h5py.File(noted, "w") as file:  # speaks of us, and is not ours
-        file.attrs.update({"format": "a note", "format_version": 4, "tool": "made with: iapb run peg_corner"})
-    rng = np.random.default_rng(0)
-    flipped = bytearray(run)
-    flipped[len(run) // 2] ^= 1
-    contents = (b"", b"half", run[: len(run) // 2], bytes(flipped), run[:-91], noted.getvalue(),
-                sealed(noted.getvalue()), sealed(b"text"), table,
-                sealed(b"x" + table), rng.bytes(999), b"\x89HDF\r\n\x1a\n", run + b"more")
-    names = ("{}.h5", "run{}-0123456789abcdef.h5", ".x{}.h5.77.writing", "x{}.h5.partial", "x{}.h5.damaged",
-             "run{}-0123456789abcdef.h5.partial", "run{}-0123456789abcdef.h5.damaged", ".iapb-store.json.{}.writing",
-             ".0000000{}.part.7.writing", "{}.h5.parts/00000001.part", "{}.h5.parts/lock", "{}.h5.parts/00000000.part",
-             "{}.h5.parts/.00000000.part.7.writing", "notes{}.txt", "mine{}.writing")  # fmt: skip
-    for number, content in enumerate(contents):
-        for name in names:
-            path = folder / name.format(number)
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(content)
-    (folder / "twin.h5").hardlink_to(folder / "ours.h5")
-    (folder / "link.h5").symlink_to(folder / "ours.h5")
-    (folder / "new\nline.h5").write_bytes(bytes(flipped))
-    os.mkfifo(folder / "pipe.h5")
-    os.mkfifo(folder / ".p.h5.1.writing")
-    for path in folder.rglob("*"):
-        os.utime(path, (0, 0), follow_symlinks=False)
-    return len(contents) * len(names)
+def process(*words, folder):
+    return subprocess.run(words, cwd=folder, capture_output=True, timeout=120, text=True,
+                          env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL)  # fmt: skip
 
 
-def listing(folder: Path) -> dict[str, Any]:
-    return {str(path): path.read_bytes() if path.is_file() and not path.is_symlink() else path.lstat().st_mode
-            for path in sorted(folder.rglob("*"))}
-
-
-def test_no_foreign_byte_is_changed(tmp_path: Path) -> None:
-    mark_store(tmp_path)
-    assert strewn(tmp_path) + 6 > 200
-    before = listing(tmp_path)
-    for words, status in (("store check", 1), ("store repair", 0), ("store gc", 0), ("store gc --delete", 0),
-                          ("store again", 1), ("certify", 1)):
-        said = refused(*words.split(), tmp_path, status=status)
-        assert "\nline.h5" not in said
-    RunStore(tmp_path)
-    assert listing(tmp_path) == before
-
-
-def shell(line: str, folder: Path, **more: Any) -> subprocess.CompletedProcess[str]:
-    program = line.replace("IAPB", f"{sys.executable} -m reports.cli")
-    return subprocess.run(["bash", "-c", program], cwd=folder, capture_output=True, timeout=120, text=True,
-                          env={**os.environ, "PYTHONPATH": str(ROOT)}, **more)  # fmt: skip
+FULL = "iapb: standard output: No space left on device\n"
 
 
 @pytest.mark.parametrize(("line", "status", "said"), [
     ("IAPB scenes | true; echo ${PIPESTATUS[0]}", "0", ""),
     ("IAPB --help | true; echo ${PIPESTATUS[0]}", "0", ""),
     ("IAPB inspect run.h5 | true; echo ${PIPESTATUS[0]}", "0", ""),
-    ("IAPB inspect run.h5 >/dev/full; echo $?", "1", "iapb: standard output: No space left on device\n"),
-    ("IAPB --help >/dev/full; echo $?", "1", "iapb: standard output: No space left on device\n"),
+    ("IAPB inspect run.h5 >/dev/full; echo $?", "1", FULL), ("IAPB --help >/dev/full; echo $?", "1", FULL),
     ("IAPB inspect run.h5 2>/dev/full >/dev/null; echo $?", "0", ""),
-    ("IAPB inspect absent.h5 2>/dev/full; echo $?", "1", ""),
-    ("IAPB inspect run.h5 >&-; echo $?", "0", ""),
+    ("IAPB inspect absent.h5 2>/dev/full; echo $?", "1", ""), ("IAPB inspect run.h5 >&-; echo $?", "0", ""),
     ("IAPB run peg_corner --set duration=0.01 --out out >&- 2>&-; echo $?; cat out/*.h5 | wc -c >&2", "0", "0"),
     ("IAPB inspect run.h5 <&- >&- 2>&-; echo $?", "0", ""),
 ])  # fmt: skip
-def test_streams_that_end_or_are_full_blame_no_file(line: str, status: str, said: str, tmp_path: Path) -> None:
+def test_streams_that_end_or_are_full_blame_no_file(line, status, said, tmp_path):
     write_run(tmp_path / "run.h5", sample_run())
-    done = shell(line, tmp_path)
+    done = process("bash", "-c", line.replace("IAPB", f"{sys.executable} -m reports.cli"), folder=tmp_path)
     assert done.stdout.strip() == status and "run.h5" not in done.stderr and "Traceback" not in done.stderr, done
     assert done.stderr == said or (said == "0" and int(done.stderr) > 1000), done
 
 
-def test_names_stay_on_one_line_and_a_folder_without_runs_is_not_certified(tmp_path: Path) -> None:
-    assert "expected run files, or folders that hold some" in refused("certify", tmp_path)
-    said = refused("run", "peg_corner", "--set", "duration=0.4", "--out", tmp_path / "a\nname", status=0)
-    assert "a\\nname" in said and "\nname" not in said.replace("a\\nname", "")
-
-
-def limited(act: Callable[..., Any], *words: Any) -> Any:
+def limited(act, *words):
     """Do something where no file may have more than 50 bytes."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (50, 50))
     return act(*words)
 
 
-def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path):
     run, place = write_run(tmp_path / "run.h5", sample_run()), tmp_path / "new" / "file"
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(RunFileError, match="pipe: cannot be written: .* in its place"):
@@ -382,14 +345,14 @@ def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path: Pat
         assert list(place.parent.iterdir()) == []
 
 
-def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path: Path) -> None:
-    program = ("import signal, sys, pathlib\nfrom tests.robustness.faults import put, sample_run\nsample_run()\n"
+def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path):
+    program = ("import signal, sys, pathlib\nfrom tests.robustness.samples import put, sample_run\nsample_run()\n"
                "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a process in the background ignores it
                "print('go', flush=True)\nfor number in range(10**6): put(pathlib.Path(sys.argv[1]), number)")
     for attempt in range(4):
         child = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], cwd=ROOT, stdout=subprocess.PIPE,
                                  stderr=subprocess.PIPE, text=True)  # fmt: skip
-        assert child.stdout is not None and child.stdout.readline() == "go\n"
+        assert child.stdout.readline() == "go\n"
         time.sleep(0.3 + 0.05 * attempt)
         child.send_signal(signal.SIGINT)
         try:
@@ -399,11 +362,35 @@ def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path: Path) -> None:
         assert child.returncode == -signal.SIGINT and "ignored" not in said, said
 
 
-def test_colours_and_directions_of_a_file_do_not_pass(tmp_path: Path) -> None:
-    """On a terminal, too."""
-    orders = "\x1b[8mhidden\x1b[0m \u200f\u061c\u200bx"
-    write_run(tmp_path / "run.h5", sample_run(), provenance={"commit": orders})
-    program = f"import pty, sys; sys.exit(pty.spawn([{sys.executable!r}, '-m', 'reports.cli', 'inspect', 'run.h5']))"
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, timeout=60, text=True,
-                          env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL)  # fmt: skip
-    assert "hidden" in done.stdout and not set(done.stdout) & set("\x1b\u200f\u061c\u200b"), json.dumps(done.stdout)
+def test_no_text_or_name_of_a_file_gives_the_terminal_orders(tmp_path, capsys):
+    orders = f"\x1b[8mhidden\x1b[0m \u200f\u061c\u200bx{ORDERS}"
+    path = write_run(tmp_path / f"{ORDERS}.h5", sample_run(), provenance={"commit": orders, ORDERS: "a name"})
+    terminal = (
+        f"import pty, sys; sys.exit(pty.spawn([{sys.executable!r}, '-m', 'reports.cli', 'inspect', {path.name!r}]))")
+    assert main(["inspect", str(path)]) == 0
+    shown = (*capsys.readouterr(), process(sys.executable, "-c", terminal, folder=tmp_path).stdout)
+    path.write_bytes(b"no run")
+    assert main(["inspect", str(path)]) == 1 and main(["store", "check", str(path)]) == 1
+    (tmp_path / "bare").mkdir()
+    assert "expected run files, or folders that hold some" in refused("certify", tmp_path / "bare")
+    said = refused("run", "peg_corner", "--set", "duration=0.4", "--out", tmp_path / "a\nname", status=0)
+    assert "a\\nname" in said and "\nname" not in said.replace("a\\nname", "")
+    for text in (*shown, *capsys.readouterr()):
+        assert not set(text) & set("\x1b\x07\x9b\x08\u202e\u200f\u061c\u200b"), json.dumps(text)
+    assert "\\x1b]0;owned\\x07" in shown[0] and "hidden" in shown[0] and "hidden" in shown[2]
+
+
+def test_a_terminal_gets_colours_and_nothing_else_that_it_obeys():
+    stream = io.StringIO()
+    stream.isatty = lambda: True
+    Harmless(stream, re.compile(r"(\x1b\[[0-9;]*m)")).write(f"\x1b[1;31mred\x1b[0m\n{ORDERS}")
+    assert stream.getvalue() == f"\x1b[1;31mred\x1b[0m\n{harmless(ORDERS)}"
+    assert harmless("tab\tand\nend") == "tab\tand\nend" and "\r" not in harmless(ORDERS)
+
+
+def test_without_a_folder_for_the_cache_kernels_are_compiled_in_memory_and_it_is_said():
+    program = ("import numba.core.caching as c; c.CacheImpl._locator_classes = []\n"
+               "import numpy as np; from iapb.compiled import copy_into\n"
+               "a = np.zeros(3); copy_into(a, np.ones(3)); print(a.sum())")  # fmt: skip
+    done = process(sys.executable, "-c", program, folder=ROOT)
+    assert done.stdout.strip() == "3.0" and done.stderr.count("UserWarning: kernels are compiled anew") == 1

@@ -1,44 +1,346 @@
 """Wrong input of every kind: read, or refused by one of iapb's errors; never a traceback, a hang or endless memory.
 
-`inputs` says what is damaged and who reads it, `damage` how. What breaks something stays in the folder of the test.
+Valid samples are damaged by a generator that each case seeds: bytes, texts, plain values, HDF5, and command lines.
 """
 
-from __future__ import annotations
-
+import contextlib
+import copy
+import gzip
+import io
+import json
 import resource
+import shutil
 import signal
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from functools import cache
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from iapb.errors import IapbError
-from tests.robustness.inputs import KINDS, TIMES, prepare
+from iapb import decide_effects, load_scene, simulate
+from iapb.errors import IapbError, RunFileError
+from iapb.mechanics.urdf import read_collisions, read_urdf
+from iapb.scene import scene_folder
+from iapb.scene.document import Document
+from reference.datasets import read_problem
+from reports.cli import main
+from reports.commands.inspect import inspect
+from reports.store.io import sealed
+from reports.store.tables import read_table
+from reports.sweeps.study import load_study, points_of, scene_of
+from tests.robustness.samples import TIMES, fclib_files, result_files
 
 pytestmark = pytest.mark.thorough
 
 READ, REFUSED, BROKEN = "read", "refused", "broken"
 LONGEST = 20.0  # [s] of this process's own time; a case takes milliseconds, the largest legal file a few seconds
-_MEMORY = 4 << 30  # bytes beyond what the process has: a wrong file may not ask for more
+MEMORY = 4 << 30  # bytes beyond what the process has: a wrong file may not ask for more
+STEPS = 3  # of a scene that is read all the same: it must also start
+# What trips readers: signs of YAML, XML and JSON, numbers at the edges, texts that are no text.
+TOKENS = (
+    "~", "null", "true", ".nan", ".inf", "nan", "inf", "1e999", "-1", "0", "1e-400", "9" * 400, "0x1F", "1_0", "''",
+    '"', "'", "[]", "{}", "[[[[", "}", "]", "- ", ": ", "? ", "&a ", "*a", "<<: *a", "|", ">", "%YAML 1.1", "---",
+    "...", "!!python/object/apply:os.abort []", "#", "@", "`", "\t", "\r", "\n", "\n\n  ", "\x00", "\x85", "\u2028",
+    "\ufeff", "\U0001f600", '"\\uD800"', "2001-01-01", "world", "kind", "name", "e" * 3000, "<", ">", "</robot>",
+    "<![CDATA[", "]]>", "<!DOCTYPE a [<!ENTITY b 'c'>]>", "&b;", "&#0;", "<?xml version='1.1'?>", "<link/>",
+    "../../../etc/passwd", "/dev/zero", "-0", "+1", "1e308", "-1e308", "5e-324", "2147483648",
+    "-9223372036854775809", "== END ==", "(", ")",
+)  # fmt: skip
+VALUES = (
+    None, True, False, 0, 1, -1, 0.0, -0.0, 1e-13, 1e-12, 1e9, -1e9, 1.1e9, 1e308, 5e-324, 10**17, "", " ", "x",
+    "world", "planar", "../x", "/", "a\x00b", "robots/six_axis_arm.urdf", [], {}, [[]], [0], [0, 0], [0, 0, 0],
+    [1e9] * 3, [0, 0, 0, 1], {"kind": "circle", "radius": 1e-12}, {"kind": "sphere", "radius": 1e9}, {"name": "peg"},
+    ["a"] * 50,
+)  # fmt: skip
+MOST_CHANGES = 4  # per case: more, and the first mistake hides the others
+NEST = 40  # levels; a scene has seven
+
+
+def changes(rng):
+    """Return a range of a random number of changes."""
+    return range(int(rng.integers(1, 1 + MOST_CHANGES)))
+
+
+def chosen(rng, values):
+    """Return one of the values."""
+    return values[int(rng.integers(len(values)))]
+
+
+def damaged_bytes(content, rng):
+    """Return the bytes with some flipped, lost, repeated, replaced or cut off."""
+    for _ in changes(rng):
+        at, length = int(rng.integers(len(content) + 1)), int(2 ** rng.uniform(0, 8))
+        before, piece, after = content[:at], content[at : at + length], content[at + length :]
+        flipped = bytes([content[at] ^ (1 << int(rng.integers(8)))]) + content[at + 1 :] if at < len(content) else b""
+        content = before + chosen(rng, [flipped, after, piece + piece + after, rng.bytes(len(piece)) + after,
+                                        bytes(len(piece)) + after, b"\xff" * len(piece) + after, b""])  # fmt: skip
+    return content
+
+
+def damaged_text(text, rng, other=""):
+    """Return the text with tokens put in, lines and words lost, moved or repeated, or the end of another text."""
+    for _ in changes(rng):
+        at, lines = int(rng.integers(len(text) + 1)), text.split("\n")
+        line, to = (int(rng.integers(len(lines))) for _ in range(2))
+        words = lines[line].split(" ")
+        words[int(rng.integers(len(words)))] = token = str(chosen(rng, TOKENS))
+        shifted = " " * int(rng.integers(1, 4)) + lines[line] if rng.random() < 0.5 else lines[line].lstrip()
+        text = chosen(rng, [
+            text[:at] + token + text[at:],
+            text[:at] + text[at + int(rng.integers(1, 30)) :],
+            text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at:],
+            text[:at] + (other[int(rng.integers(len(other))) :] if other else ""),
+            "\n".join([*lines[:line], " ".join(words), *lines[line + 1 :]]),
+            "\n".join([*lines[:line], shifted, *lines[line + 1 :]]),
+            "\n".join(lines[:line] + lines[line + 1 :]),
+            "\n".join([*lines[:to], lines[line], *lines[to:]]),
+        ])  # fmt: skip
+    return damaged_bytes(text.encode(), rng) if rng.random() < 0.1 else text.encode()
+
+
+def damaged_values(plain, rng):
+    """Return plain values (mappings, lists, numbers, texts) with some replaced, lost, renamed, repeated or nested."""
+    plain = copy.deepcopy(plain)
+    for _ in changes(rng):
+        places = list(places_of(plain))
+        if not places:
+            return plain
+        (owner, key), (other, where) = chosen(rng, places), chosen(rng, places)
+        kind, taken = int(rng.integers(7)), copy.deepcopy(other[where])
+        if kind <= 1:
+            owner[key] = copy.deepcopy(chosen(rng, VALUES))
+        elif kind == 2:
+            del owner[key]
+        elif kind == 3:
+            owner[key] = taken
+        elif kind == 4 and isinstance(owner, list):
+            owner.insert(key, taken)
+        elif kind == 4:
+            owner[f"{key}s"] = owner.pop(key)
+        elif kind == 5 and isinstance(owner[key], int | float):
+            owner[key] = float(owner[key]) * float(10.0 ** rng.integers(-12, 12)) * float(rng.choice([-1.0, 1.0]))
+        else:
+            for _ in range(int(rng.choice([1, 1, 2, NEST]))):
+                owner[key] = [owner[key]] if rng.random() < 0.5 else {"name": owner[key]}
+    return plain
+
+
+def places_of(value):
+    """Yield every (mapping or list, key) of plain values."""
+    if isinstance(value, dict | list):
+        for key in list(value) if isinstance(value, dict) else range(len(value)):
+            yield value, key
+            yield from places_of(value[key])
+
+
+def damaged_hdf5(content, rng):
+    """Damage to what the file says: parts lost, renamed, of another shape or type."""
+    stream, names = io.BytesIO(content), []
+    with h5py.File(stream, "r+") as file:
+        file.visit(names.append)
+        for _ in changes(rng):
+            if (name := chosen(rng, names)) in file:
+                damage_part(file, name, rng)
+    return stream.getvalue()
+
+
+def damage_part(file, name, rng):
+    kind, wrong = int(rng.integers(5)), chosen(rng, WRONG)
+    owner = file[name] if rng.random() < 0.5 else file
+    if kind == 0 and len(owner.attrs):
+        attribute = chosen(rng, sorted(owner.attrs))
+        if rng.random() < 0.5 or not isinstance(wrong, np.ndarray):
+            del owner.attrs[attribute]
+        else:
+            owner.attrs[attribute] = wrong
+        return
+    if kind == 1:
+        file.move(name, f"{name}_")
+        return
+    del file[name]
+    if kind == 2:
+        file.create_group(name)
+    elif isinstance(wrong, tuple):  # stated to be large, never written: a few bytes on the disk
+        file.create_dataset(name, shape=wrong, dtype=np.float64, chunks=(1024,) * len(wrong))
+    elif kind >= 3:
+        file[name] = wrong
+
+
+WRONG = (
+    np.zeros(0), np.zeros(3), np.array([-1], np.int32), np.array([2**31 - 1], np.int64), np.array([1e308, np.nan]),
+    np.array([[1.0, 2.0], [3.0, 4.0]]), np.bytes_("word"), "text \u00e9", np.array([0, 7, -3], np.int32), (2**40,),
+    (2**20, 2**20), np.array([3], np.int32), np.array([-2], np.int32), np.array([1 + 2j]), np.float64(0.5),
+    np.array([True]),
+)  # fmt: skip
+
+
+# The kinds of input: samples, their damage, and who reads them
+
+
+def as_bytes(sample, other, rng):
+    return damaged_bytes(sample, rng)
+
+
+def as_text(sample, other, rng):
+    """Texts as texts; what is compressed, as bytes."""
+    if sample[:2] == b"\x1f\x8b":
+        return damaged_bytes(sample, rng)
+    return damaged_text(sample.decode(), rng, "" if other[:2] == b"\x1f\x8b" else other.decode())
+
+
+def as_values(sample, other, rng):
+    """Half of the cases are damaged as values: they are always YAML, and get past the first look."""
+    if rng.random() < 0.5:
+        return as_text(sample, other, rng)
+    return json.dumps(damaged_values(plain(sample), rng)).encode()
+
+
+@cache
+def plain(sample):
+    return Document(sample.decode()).value
+
+
+def as_hdf5(sample, other, rng):
+    return damaged_bytes(sample, rng) if rng.random() < 0.3 else damaged_hdf5(sample, rng)
+
+
+def as_hdf5_sealed(sample, other, rng):
+    """Under a seal that is right: somebody else's program wrote it."""
+    return sealed(damaged_hdf5(sample, rng))
+
+
+@cache
+def shipped(pattern):
+    """Return the files of the scenes' folder, read once."""
+    return {path.name: path.read_bytes() for path in sorted(scene_folder().glob(pattern))}
+
+
+def read_scene(path):
+    """What every command does with a scene: read it, decide its effects, start it."""
+    scene = load_scene(path)
+    decide_effects(scene)
+    simulate(scene, steps=min(STEPS, scene.steps))
+
+
+def read_study(path):
+    """Read it, find its scene, and spell out its first points."""
+    study = load_study(path)
+    list(islice(points_of(study, str(scene_of(study, path))), STEPS))
+
+
+def read_robot(path):
+    read_urdf(path)
+    read_collisions(path)
+
+
+def read_results(path):
+    """A run file, or a table: as `iapb inspect` and the report read it."""
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            inspect(path, 3)
+    except RunFileError:
+        read_table(path, "sample")
+
+
+LCP = b"2\n2 1\n1 2\n-5 -6\n"
+PROBLEMS = {"two.lcp": LCP, "two.lcp.gz": gzip.compress(LCP, mtime=0),
+            "fathi.dat": b"3\n0\n3\n3\n3\n3\n1 0 0\n2 1 0\n2 2 1\n-8 -6 -4\nexample of Fathi\n", "contacts.txt": b"""\
+# two contacts
+numDof = 6
+constraint types = MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT
+E = ((-1) (-2))
+HCHt = ((2 1)
+        (1 2))
+mu = (0 0)
+lambda = ((0) (1))
+== END ==
+"""}  # fmt: skip
+LINES = (
+    "run peg_corner --set duration=0.05",
+    "run two_discs --world PB --set duration=0.05 --set contact.restitution=0.5",
+    "run peg_corner --rendering scale --set duration=0.05 --set bodies.peg.position=[0.03,-0.01,0]",
+    "effects peg_corner --world ideal", "effects arm_obstacles", "inspect run.h5 --impacts 1", "schema",
+    "store check results", "store gc results", "sweep no_study --workers 1", "verify --recheck run.h5",
+    "reproduce --figure fig99",
+)  # fmt: skip
+LONG = {"verify", "prove", "reproduce", "compare", "bench"}  # a line that might start long work gets a wrong word
+WORDS = (
+    "--world", "--set", "--out", "--rendering", "--", "-", "--help", "run", "effects", "inspect", "schema", "store",
+    "CBuc", "ideal", "peg_room", "wall_1d", ".", "/", "a=b", "=", "duration=0.01", "rate=1e999", "bodies.peg.mass=0",
+    "walls=[]", "bodies=[]", "couplings=~", "hand=", "bodies.9.mass=1", "contact..x=1", "name=..", "-1", "--impacts",
+    "run.h5", "table.h5", "results", "", "contact.friction=0.3", "check", "gc",
+)  # fmt: skip
+
+
+def damaged_line(sample, other, rng):
+    """Return a line, as JSON, with words lost, doubled, exchanged or damaged."""
+    words = json.loads(sample)
+    for _ in range(int(rng.choice([1, 1, 1, 2, 3]))):
+        at, known = int(rng.integers(len(words) + 1)), str(chosen(rng, WORDS if rng.random() < 0.7 else TOKENS))
+        cut = words[at][: int(rng.integers(1 + len(words[at])))] if at < len(words) else ""
+        after = words[at + 1 :]
+        words = words[:at] + chosen(rng, [[known, *words[at:]], [known, *after], after, [cut + known, *after],
+                                          [*words[at:], *json.loads(other)[1:]]])  # fmt: skip
+    return json.dumps(words).encode()
+
+
+def run_line(path):
+    """Run a line where the files are that it may name; it must end with 0, 1 or 2, and say why where it is not 0."""
+    words = [word for word in json.loads(path.read_bytes()) if word != "--debug"]  # which shows a traceback
+    words += ["--no-such-option"] if set(words) & LONG else []
+    for place in (path.parent, path.parent / "results"):
+        place.mkdir(exist_ok=True)
+        for name, content in result_files().items():
+            (place / name).write_bytes(content)
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.chdir(path.parent), contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        status = main(words)
+    said, complained = out.getvalue().strip(), error.getvalue().strip()
+    assert status in (0, 1, 2) and "Traceback" not in complained and (not status or said or complained), (words, status)
+    if status:
+        raise IapbError(complained)
+
+
+KINDS = {  # samples, damage, reader, and how many cases are tried: fewer where a case takes long
+    "scenes": (lambda: shipped("*.yaml"), as_values, read_scene, 300),
+    "URDF robots": (lambda: shipped("robots/*.urdf"), as_text, read_robot, 200),
+    "sweep studies": (lambda: shipped("sweeps/*.yaml"), as_values, read_study, 200),
+    "LCP and MLCP files": (lambda: PROBLEMS, as_text, read_problem, 200),
+    "FCLIB files": (fclib_files, as_hdf5, read_problem, 200),
+    "run files and tables": (result_files, as_bytes, read_results, 200),
+    "sealed run files": (result_files, as_hdf5_sealed, read_results, 60),
+    "command lines": (lambda: {f"{number:02d}.json": json.dumps(line.split()).encode()
+                               for number, line in enumerate(LINES)}, damaged_line, run_line, 60),
+}  # fmt: skip
 
 
 class TooLong(BaseException):
     """A case took longer than LONGEST. Not an Exception: no reader may catch it."""
 
 
-def judge(read: Callable[[Path], Any], path: Path, content: bytes) -> tuple[str, str]:
-    """Write a case and let it be read; return the outcome and what was said."""
+def judge(read, path, content):
+    """Write a case and let it be read; return the outcome and what was said.
+
+    LONGEST is counted in this process's own time: a busy machine is no hang.
+    """
+    def stop(*_):
+        raise TooLong
+
     path.write_bytes(content)
+    before = signal.signal(signal.SIGVTALRM, stop)
     try:
-        with bounded_time():
+        signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
+        try:
             read(path)
+        finally:
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+            signal.signal(signal.SIGVTALRM, before)
     except IapbError as error:
         return REFUSED, str(error)
     except KeyboardInterrupt:
@@ -48,45 +350,30 @@ def judge(read: Callable[[Path], Any], path: Path, content: bytes) -> tuple[str,
     return READ, ""
 
 
-@contextmanager
-def bounded_time() -> Iterator[None]:
-    """Stop what runs longer than LONGEST, counted in this process's own time: a busy machine is no hang."""
-    def stop(*_: object) -> None:
-        raise TooLong
-
-    before = signal.signal(signal.SIGVTALRM, stop)
-    signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
-        signal.signal(signal.SIGVTALRM, before)
-
-
 @pytest.fixture
-def bounded_memory() -> Iterator[None]:
-    """Let memory grow by _MEMORY at most."""
+def bounded_memory():
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + _MEMORY
+    most = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
     yield
     resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 @pytest.mark.usefixtures("bounded_memory")
-@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS.keys())
-def test_wrong_input_is_read_or_refused_and_valid_input_is_read(kind: Any, tmp_path: Path) -> None:
-    prepare(tmp_path)
-    samples, outcomes = kind.samples(), Counter[str]()
+@pytest.mark.parametrize("kind", KINDS)
+def test_wrong_input_is_read_or_refused_and_valid_input_is_read(kind, tmp_path):
+    given_samples, damage, read, cases = KINDS[kind]
+    shutil.copytree(scene_folder() / "robots", tmp_path / "robots")  # cases may refer to them
+    samples, outcomes = given_samples(), Counter()
     for name, content in samples.items():
-        outcome, words = judge(kind.read, tmp_path / name, content)
-        assert outcome == READ or kind.name == "command lines", words  # some lines are wrong on purpose
+        outcome, words = judge(read, tmp_path / name, content)
+        assert outcome == READ or kind == "command lines", words  # some lines are wrong on purpose
 
-    @settings(max_examples=kind.cases * TIMES, phases=[Phase.generate], database=None)
+    @settings(max_examples=cases * TIMES, phases=[Phase.generate], database=None)
     @given(st.integers(0, 2**64 - 1), st.sampled_from(sorted(samples)), st.sampled_from(sorted(samples)))
-    def damaged(seed: int, name: str, other: str) -> None:
-        content = kind.damaged(samples[name], samples[other], np.random.default_rng(seed))
-        outcome, words = judge(kind.read, tmp_path / name, content)
+    def damaged(seed, name, other):
+        content = damage(samples[name], samples[other], np.random.default_rng(seed))
+        outcome, words = judge(read, tmp_path / name, content)
         assert outcome != BROKEN, words
         outcomes[outcome] += 1
 
@@ -94,21 +381,21 @@ def test_wrong_input_is_read_or_refused_and_valid_input_is_read(kind: Any, tmp_p
     assert outcomes[REFUSED] >= outcomes.total() // 4, "damage too mild to try anything"
 
 
-def test_a_careless_reader_is_caught(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_careless_reader_is_caught(tmp_path, monkeypatch):
     """The planted faults: a traceback and a swallowed hang; and one that is right."""
-    def careless(path: Path) -> None:
+    def careless(path):
         raise KeyError(path.name)
 
-    def endless(path: Path) -> None:
+    def endless(path):
         while True:
             try:
                 sum(range(1000))
             except Exception:
                 continue
 
-    def polite(path: Path) -> None:
+    def polite(path):
         raise IapbError("no")
 
-    monkeypatch.setattr("tests.robustness.test_fuzz.LONGEST", 0.1)
-    assert [judge(reader, tmp_path / "x", b"")[0] for reader in (careless, endless, polite)] == [
-        BROKEN, BROKEN, REFUSED]  # fmt: skip
+    monkeypatch.setitem(globals(), "LONGEST", 0.1)
+    outcomes = [judge(reader, tmp_path / "x", b"")[0] for reader in (careless, endless, polite)]
+    assert outcomes == [BROKEN, BROKEN, REFUSED]

@@ -1,11 +1,8 @@
 """What is misspelt in a robot is refused, never replaced by a default in silence; sizes are bounded."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import re
-from pathlib import Path
 
 import pytest
 
@@ -18,17 +15,25 @@ ROBOT = scene_folder() / "robots" / "seven_axis_arm.urdf"  # it has collision el
 READ = ("link", "joint", "inertial", "collision", "origin", "mass", "inertia", "axis", "parent", "child", "geometry")
 
 
+@pytest.fixture
+def robot(tmp_path):
+    """Write a robot; return its file."""
+    def written(text):
+        (tmp_path / "robot.urdf").write_text(text)
+        return tmp_path / "robot.urdf"
+
+    return written
+
+
 @pytest.mark.parametrize("tag", READ)
-def test_no_element_of_a_robot_can_be_misspelt(tag: str, tmp_path: Path) -> None:
+def test_no_element_of_a_robot_can_be_misspelt(tag, robot):
     """One letter lost, anywhere in the file; alike for the two readers of it."""
     text, wrong = ROBOT.read_text(), tag[:-2] + tag[-1]
-    places = [found.start() for found in re.finditer(rf"<{tag}\b", text)]
-    for at in places:
-        damaged = text[:at] + re.sub(rf"(</?){tag}\b", rf"\1{wrong}", text[at:])
-        (tmp_path / "robot.urdf").write_text(damaged)
+    for found in re.finditer(rf"<{tag}\b", text):
+        path = robot(text[: found.start()] + re.sub(rf"(</?){tag}\b", rf"\1{wrong}", text[found.start() :]))
         with pytest.raises(ArgumentError):
-            read_urdf(tmp_path / "robot.urdf")
-            read_collisions(tmp_path / "robot.urdf")
+            read_urdf(path)
+            read_collisions(path)
 
 
 @pytest.mark.parametrize(("text", "said"), [
@@ -36,26 +41,17 @@ def test_no_element_of_a_robot_can_be_misspelt(tag: str, tmp_path: Path) -> None
      "<origin xzy='1 0 0'/></inertial></link>", "xzy"),
     ("<link name='a'><inertial/><inertial/></link>", "twice"),
 ])  # fmt: skip
-def test_slips_of_a_robot_are_named(text: str, said: str, tmp_path: Path) -> None:
-    (tmp_path / "robot.urdf").write_text(f"<robot name='r'>{text}</robot>")
+def test_slips_of_a_robot_are_named_and_what_others_add_is_let_through(text, said, robot):
     with pytest.raises(ArgumentError, match=said):
-        read_urdf(tmp_path / "robot.urdf")
+        read_urdf(robot(f"<robot name='r'>{text}</robot>"))
+    added = "<gazebo/><link name='a'><contact/><visual/></link><transmission name='t'/>"
+    assert len(read_urdf(robot(f"<robot name='r'>{added}</robot>"))) == 1
 
 
-def test_what_others_add_to_a_robot_is_let_through(tmp_path: Path) -> None:
-    (tmp_path / "robot.urdf").write_text(
-        "<robot name='r'><gazebo/><link name='a'><contact/><visual/></link><transmission name='t'/></robot>"
-    )
-    assert len(read_urdf(tmp_path / "robot.urdf")) == 1
-
-
-def test_a_few_packed_bytes_cannot_ask_for_any_memory(tmp_path: Path) -> None:
+def test_neither_a_few_packed_bytes_nor_many_robots_can_ask_for_any_memory_or_time(tmp_path):
     (tmp_path / "bomb.lcp.gz").write_bytes(gzip.compress(b"0 " * (40 << 20), 1))
     with pytest.raises(DatasetError, match="MB"):
         read_problem(tmp_path / "bomb.lcp.gz")
-
-
-def test_many_robots_are_refused_before_one_is_read(tmp_path: Path) -> None:
     robots = [{"name": f"r{k}", "urdf": "absent.urdf"} for k in range(1000)]
     scene = {"name": "s", "dimensions": 3, "rate": 100, "duration": 1, "bodies": [], "robots": robots}
     (tmp_path / "s.yaml").write_text(json.dumps(scene))

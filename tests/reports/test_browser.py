@@ -1,0 +1,332 @@
+"""The report of made-up records as a reader meets it in a browser that is cut off from everything but its pages.
+
+Wide and narrow, light and dark, by keyboard, on paper, without script; curves, films, and the poses that films show.
+Without a browser the tests are skipped, and say so.
+"""
+
+import re
+import shutil
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reports.evidence.runs import TILTED
+from reports.figures import RECIPES
+from reports.figures.corner import UNLIMITED
+from reports.figures.film import SIZE, Film, bounds_of
+from reports.figures.geometry import outline
+from reports.figures.paper import arm_energies
+from reports.pages.builder import build_report
+from reports.pages.records import Evidence
+from reports.report import write_report
+from tests.reports.made_up import made_motion
+from verification.finding import MIXED, REPRODUCED, Part, finding_of
+from verification.table import titled
+
+pytestmark = pytest.mark.thorough
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+DESK, PHONE = (1400, 900), (400, 860)
+FIGURES = ("hero", "fig07", "fig08", "film-corner", "film-hole", "fig03")
+LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
+REAL = Path(__file__).parents[2] / "out" / "report.html"
+MOST_PRINTED = 6  # pages of paper for the first page
+ANSWERED = ("Tested", "✓ Holds", "✕ Fails", "✓ Energy", "Known failures", "What next?")  # one screen, two of a phone
+BELOW = """([texts, depth]) => texts.filter((text) => {
+    const found = [...document.querySelectorAll(".first dt")]
+        .find((part) => part.textContent.replace(/\\s+/g, " ").startsWith(text));
+    return !found || found.getBoundingClientRect().bottom + scrollY > depth;
+})"""
+# What a page must be at any width; each returns what is wrong.
+OUT_OF_SIGHT = """() => [...document.querySelectorAll("figure svg")]
+    .filter((svg) => !svg.closest("details:not([open])") && !svg.parentElement.closest("svg"))
+    .map((svg) => [svg.getAttribute("aria-label") || svg.className.baseVal, svg.getBoundingClientRect(),
+                   svg.closest(".wide") !== null])  // a wide panel scrolls by itself
+    .filter(([, box, scrolls]) => box.width < 5 || box.height < 5
+                                  || (!scrolls && (box.left < -1 || box.right > innerWidth + 1)))
+    .map(([name]) => name)"""
+OVERFLOW = """() => document.documentElement.scrollWidth - innerWidth"""
+CLIPPED = """() => [...document.querySelectorAll("p, h1, main h2, main h3, main li, main dd, button, summary")]
+    .filter((part) => part.checkVisibility() && !part.closest(".scroll, .display, .steps, .plain"))
+    .filter((part) => part.getBoundingClientRect().right > innerWidth + 1)
+    .map((part) => part.textContent.slice(0, 60))"""
+# Contrast of every text with the colour below it, WCAG's formula.
+PALE = """(least) => {
+    const canvas = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+    const rgba = (color) => {
+        canvas.clearRect(0, 0, 1, 1); canvas.fillStyle = color; canvas.fillRect(0, 0, 1, 1);
+        return [...canvas.getImageData(0, 0, 1, 1).data];
+    };
+    const linear = (v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+    const light = (color) => color.slice(0, 3).map((v) => linear(v / 255))
+        .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+    const below = (part) => {
+        for (let place = part; place; place = place.parentElement) {
+            const color = rgba(getComputedStyle(place).backgroundColor);
+            if (color[3] === 255) return color;
+        }
+        return [255, 255, 255, 255];
+    };
+    const found = {};
+    for (const part of document.querySelectorAll("body *")) {
+        const own = [...part.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+        if (!own || !part.checkVisibility() || part.closest("script, .skip")) continue;
+        const style = getComputedStyle(part);
+        const [a, b] = [light(rgba(part.closest("svg") ? style.fill : style.color)), light(below(part))];
+        const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+        const name = `${part.tagName}.${part.className.baseVal ?? part.className}`;
+        if (contrast < least) found[name] = contrast.toFixed(2);
+    }
+    return found;
+}"""
+FOCUSED = "(names) => names.filter((name) => document.activeElement.matches(name))"
+REACHED = {"figures": {"#fig07 .legend button", "summary", ".scroll"},
+           None: {".controls button", ".controls input", ".ways a"}}  # fmt: skip
+READ = """() => [...document.querySelector("#fig07 .readout:not([hidden])").children]
+    .map((row) => [row.firstChild.textContent, row.querySelector("b").textContent])"""
+PLACE = """() => {
+    const body = document.querySelector('#film-corner svg > g > g');
+    const t = body.ownerSVGElement.getCTM().inverse().multiply(body.getCTM());
+    return [t.a, t.b, t.c, t.d, t.e, t.f];
+}"""
+MOVED = "(old) => String((" + PLACE + ")()) !== String(old)"
+TO_THE_END = "(input) => { input.value = input.max; input.dispatchEvent(new Event('input')); }"
+
+
+@pytest.fixture(scope="module")
+def evidence():
+    """Made-up records: a little of each kind, wide tables and long words among them."""
+    names = sorted({name for recipe in RECIPES if recipe.key in FIGURES for name in recipe.needs if "/" in name})
+    runs = {name: made_motion("peg_corner", k) for k, name in enumerate(names)}
+    tilted = {tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015, 0.3)}
+    table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
+    return Evidence(
+        inputs={**runs, TILTED: tilted, "arm_energies": arm_energies()},
+        claims=(finding_of("C01", "C01", "energy never rises", "half: $\\frac{1}{2}$",
+                           (Part("p.", MIXED, "as printed"),), {"C01": table}),),
+        topics=(finding_of("scene-ledger", "The scenes", "Asked.", "It holds.", (Part("It holds.", REPRODUCED),),
+                           {"wide": table}),),
+        provenance={"commit": "0123456789abcdef" * 4},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def first(evidence, tmp_path_factory):
+    """The first page of the report of made-up records, with a few figures of each kind."""
+    recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
+    return write_report(tmp_path_factory.mktemp("page"), build_report(evidence, recipes))
+
+
+@pytest.fixture(scope="module")
+def started():
+    """A browser; without one the tests are skipped, and say why."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip(f"no browser is installed (looked for {', '.join(NAMES)})")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=found, args=list(ARGUMENTS))
+        yield browser
+        browser.close()
+
+
+class Sight:
+    """A page in a browser, and what it did that it should not: `errors` of its console, `requests` beside its own."""
+
+    def __init__(self, page):
+        self.page, self.ask, self.errors, self.requests = page, page.evaluate, [], []
+        page.on("console", lambda said: said.type in ("error", "warning") and self.errors.append(said.text))
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+
+@pytest.fixture(scope="module")
+def see(started, first):
+    """Return ``see(page="figures", size=DESK, **context)``: a context manager that opens a section's page or a file.
+
+    Any request of it but for another page of the report is refused and remembered.
+    """
+    @contextmanager
+    def opened(page="figures", size=DESK, **context):
+        path = page if isinstance(page, Path) else first.parent / "report" / f"{page}.html"
+        pages = {page.resolve().as_uri() for page in path.parents[path.parent.name == "report"].rglob("*.html")}
+        room = started.new_context(viewport={"width": size[0], "height": size[1]}, offline=True, **context)
+        sight = Sight(room.new_page())
+
+        def judge(route):
+            if route.request.url.split("#")[0] in pages or route.request.url.startswith("data:"):
+                route.continue_()
+            else:
+                sight.requests.append(route.request.url)
+                route.abort()
+
+        room.route("**/*", judge)
+        sight.page.goto(path.resolve().as_uri())
+        yield sight
+        room.close()
+
+    return opened
+
+
+@pytest.fixture
+def desk(see):
+    """The page of the figures, one's own, to change."""
+    with see() as seen:
+        yield seen
+
+
+def pages_of(first):
+    return [first, *sorted((first.parent / "report").glob("*.html"))]
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+@pytest.mark.parametrize("report", ["made up", "here"])
+def test_each_page_is_whole_and_the_first_screens_of_the_report_that_is_here_answer(see, first, report, size):
+    if report == "here" and not REAL.is_file():
+        pytest.skip("no out/report.html here; `make reproduce` makes one")
+    figures, given = 0, first if report == "made up" else REAL
+    with see(given, size) as sight:
+        for path in pages_of(given):
+            sight.page.goto(path.as_uri())
+            assert (sight.errors, sight.requests) == ([], [])
+            assert sight.ask(OUT_OF_SIGHT) == sight.ask(CLIPPED) == [] and sight.ask(OVERFLOW) <= 0
+            figures += sight.ask("() => document.querySelectorAll('figure').length")
+        sight.page.goto(given.as_uri())
+        assert figures == 6 or given == REAL and sight.ask(BELOW, [ANSWERED, (1 + (size == PHONE)) * size[1]]) == []
+        assert given == first or len(re.findall(rb"/Type\s*/Page[^s]", sight.page.pdf(format="A4"))) <= MOST_PRINTED
+
+
+def test_the_checks_see_a_page_that_is_not_whole(desk):
+    desk.ask("""() => {
+        document.querySelector("main figure svg:not(.swatch)").style.height = "0";
+        const wide = { textContent: "wide", style: "width: 3000px" };
+        document.querySelector("main").append(Object.assign(document.createElement("p"), wide));
+        document.querySelector("h3").style.color = "#888";
+        document.body.append(Object.assign(new Image(), { src: "https://example.org/a.png" }));
+    }""")
+    desk.page.wait_for_timeout(100)
+    assert len(desk.ask(OUT_OF_SIGHT)) == 1 and desk.ask(OVERFLOW) > 1000 and desk.ask(CLIPPED) == ["wide"]
+    assert "H3." in desk.ask(PALE, LEAST_CONTRAST)
+    assert desk.errors != []  # the page's own policy refused the picture, before any request
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_text_can_be_read(see, first, scheme):
+    with see(color_scheme=scheme) as sight:
+        for path in pages_of(first):
+            sight.page.goto(path.as_uri())
+            sight.ask("() => document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+            assert sight.ask(PALE, LEAST_CONTRAST) == {}
+
+
+def test_without_script_the_content_is_there(see, first):
+    with see(size=PHONE, java_script_enabled=False) as sight:
+        page = sight.page
+        assert page.locator("figure").count() == 3 and page.locator("#fig07 [data-curve] path").count() > 0
+        assert page.locator("button:visible, input:visible").count() == 0 and sight.errors == []
+    with see(first, PHONE, java_script_enabled=False) as sight:
+        assert sight.page.locator("#film-corner svg animateTransform").count() == 4 * 2
+    with see("scene-ledger", PHONE, java_script_enabled=False) as sight:
+        box = sight.page.locator("#film-hole .panel > svg").bounding_box()
+        assert box["width"] > 100 and box["height"] > 75 and sight.errors == []
+
+
+@pytest.mark.parametrize("name", REACHED)
+def test_the_keyboard_reaches_everything(see, first, name):
+    with see(name or first) as sight:
+        sight.ask("() => document.querySelectorAll('#fig07 details').forEach((part) => { part.open = true; })")
+        sight.page.keyboard.press("Tab")
+        assert sight.ask("() => document.activeElement.className") == "skip"
+        reached = set()
+        for _ in range(120):
+            sight.page.keyboard.press("Tab")
+            reached |= set(sight.ask(FOCUSED, list(REACHED[name])))
+        assert reached == REACHED[name]
+
+
+def test_a_link_into_something_folded_unfolds_it(see, first):
+    with see("claims") as sight:
+        sight.ask("() => { location.hash = '#C01'; }")
+        sight.page.wait_for_function("() => document.getElementById('C01').open")
+        sight.page.goto(first.as_uri())
+        sight.page.locator("main a", has_text="C01").click()
+        sight.page.wait_for_function("() => document.getElementById('C01')?.open")
+
+
+def test_print_shows_the_content_and_no_controls(see):
+    for page, unfolded in (("claims", "#C01 .claim-body"), ("figures", "#fig07 .numbers table")):
+        with see(page) as sight:
+            sight.page.emulate_media(media="print")
+            sight.ask("() => window.dispatchEvent(new Event('beforeprint'))")
+            assert sight.page.locator(unfolded).is_visible()
+            assert sight.page.locator(".controls:visible, .tools:visible, nav:visible").count() == 0
+            assert len(sight.page.pdf()) > 10_000
+
+
+def test_a_world_can_be_hidden_and_shown(desk):
+    button = desk.page.locator("#fig07 .legend button", has_text="PB").filter(has_not_text="IAPB")
+    curves = desk.page.locator("#fig07 [data-trace] [data-curve='PB']")
+    assert curves.count() == 6 and curves.first.is_visible()
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    assert not any(curve.is_visible() for curve in curves.all())
+    assert desk.page.locator("#fig07 [data-trace] [data-curve='IAPB']").first.is_visible()
+    button.press("Enter")
+    assert all(curve.is_visible() for curve in curves.all())
+
+
+def test_the_cursor_reads_the_values_of_the_run(desk, evidence):
+    """To within what the drawing keeps: 0.02 of its 180 points of height; the cursor stands between two steps."""
+    plot = desk.page.locator("#fig07 svg[data-trace=time]").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    desk.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.4 * box["height"])
+    rows = {name: value.replace("\N{MINUS SIGN}", "-") for name, value in desk.ask(READ)}
+    run = evidence.inputs["corner/ideal"]
+    x = 1e3 * run.device_q[:, 0]
+    near = x[np.abs(run.time - float(rows["t [s]"])) < 1.1 * run.dt]
+    kept = np.ptp(x) * 0.02 / 180
+    assert near.min() - kept <= float(rows["ideal"]) <= near.max() + kept
+    assert np.ptp(near) < np.ptp(x) / 10  # or the bracket would say nothing
+    assert desk.page.locator("#fig07 .readout:visible").count() == 5  # the panels over time read together
+
+
+def test_the_slider_shows_one_tilt_at_a_time(see, first):
+    shown = """() => [...document.querySelectorAll("#hero [data-state]:not([display=none])")]
+        .map((each) => each.dataset.state)"""
+    with see(first) as desk:
+        assert desk.ask(shown) == ["1", "1"]  # the tilt of the scene, in both pictures
+        desk.page.locator("#hero input[type=range]").evaluate(TO_THE_END)
+        assert desk.ask(shown) == ["2", "2"] and desk.page.locator("#hero text", has_text="Tilt 17.19°").is_visible()
+
+
+def test_a_film_plays_stops_and_shows_the_poses_of_the_run(see, first, evidence):
+    """It begins shortly before the first contact; at the end, the corners of the peg are where the run has them."""
+    runs = [evidence.inputs[name] for name in UNLIMITED.values()]
+    touched = min(run.time[np.flatnonzero(np.diff(run.contacts.offsets))[0]] for run in runs)
+    with see(first) as desk:
+        player, start = desk.page.locator("#film-corner"), desk.ask(PLACE)
+        button, slider = player.locator(".controls button"), player.locator("input[type=range]")
+        assert 0.0 < touched - 0.031 <= float(slider.input_value()) <= touched - 0.03 + 5 * runs[0].dt
+        button.click()
+        desk.page.wait_for_function(MOVED, arg=start)
+        button.click()
+        stopped = desk.ask(PLACE)
+        desk.page.wait_for_timeout(100)
+        assert desk.ask(PLACE) == stopped
+        slider.evaluate(TO_THE_END)
+        a, b, c, d, e, f = desk.ask(PLACE)
+        drawn = desk.page.locator("#film-corner svg > g > g > path").first.get_attribute("d")
+    low, high = bounds_of(runs)
+    made = Film(runs[0], low, SIZE[0] / float(high[0] - low[0]), 1.0, 1)
+    x, y, angle = runs[0].pose[-1, 0]
+    corners = outline(runs[0].scene_resolved["bodies"][0]["shapes"][0])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    expected = made.flat(corners @ turn.T + [x, y])
+    local = np.array([list(map(float, pair.split())) for pair in drawn.strip("Mz").split("L")])
+    np.testing.assert_allclose(local @ [[a, b], [c, d]] + [e, f], expected, atol=0.3)  # of 400 units of the picture

@@ -1,0 +1,267 @@
+"""Keys, files of runs and tables: the way there and back, what other programs see, what a damaged file is worth."""
+
+import dataclasses
+import io
+import platform
+from functools import partial
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from iapb.errors import ArgumentError, RunFileError
+from reports.provenance import collect_provenance
+from reports.store import (
+    content_hash,
+    keys,
+    read_provenance,
+    read_run,
+    read_table,
+    run_key,
+    write_run,
+    write_table,
+)
+from reports.store.io import sealed
+from reports.store.schema import FORMAT_VERSION
+from reports.store.tables import read_record, write_record
+from verification.table import titled
+
+TURNED = {
+    "q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)), "device_q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)),
+    "coordinate_names": ("base.w", "base.x", "base.y", "base.z"), "coordinate_units": ("1",) * 4,
+    "velocity_names": ("base.rx", "base.ry", "base.rz"), "velocity_units": ("rad/s",) * 3, "tool_coordinates": (0, 4),
+}  # a configuration that is longer than the velocity
+TABLE = titled(("point", "energy [J]", "world", "rank"), [(3, 0.5, "A", None), (1, 0.25, "ä", 2)])
+
+
+def assert_same(left, right, place="run"):
+    """Equal to the last bit, types included."""
+    assert type(left) is type(right), place
+    if dataclasses.is_dataclass(left):
+        for field in dataclasses.fields(left):
+            assert_same(getattr(left, field.name), getattr(right, field.name), f"{place}.{field.name}")
+    elif isinstance(left, np.ndarray):
+        assert (left.dtype, left.shape, left.tobytes()) == (right.dtype, right.shape, right.tobytes()), place
+    elif isinstance(left, dict):
+        assert_same(list(left.items()), list(right.items()), place)
+    elif isinstance(left, tuple | list):
+        assert len(left) == len(right), place
+        for index, pair in enumerate(zip(left, right, strict=True)):
+            assert_same(*pair, f"{place}[{index}]")
+    else:
+        assert left == right, place
+
+
+@pytest.mark.parametrize("shape", [
+    {}, {"contacts": 0, "impacts": 0}, {"tool_dofs": (0, 0)}, {"tool_dofs": (1, 3)}, {"complete": False}, TURNED,
+    {"energy": {}, "effects": ()}, {"remarks": ("chosen",), "distrust": ("it sank é", "it flew")},
+    {"steps": 5000, "contacts": 20000}, {"v": np.array([[np.nan, -0.0, np.inf]] * 21)},
+])  # fmt: skip
+def test_a_run_comes_back_bit_for_bit(tmp_path, make_run, shape):
+    run = make_run(**shape)
+    assert_same(read_run(write_run(tmp_path / "run.h5", run)), run)
+
+
+def test_a_run_saves_itself_and_replaces_a_file_only_if_asked(tmp_path, make_run):
+    first, other = make_run(), make_run(seed=1)
+    for run, replace, kept in ((first, False, first), (other, False, first), (other, True, other)):
+        assert content_hash(read_run(run.save(tmp_path / "run.h5", replace=replace))) == content_hash(kept)
+
+
+def test_the_content_hash_is_that_of_the_results_alone(tmp_path, make_run):
+    run = make_run()
+    slower = dataclasses.replace(run, chunk_seconds=run.chunk_seconds * 3, kernel="python")
+    assert content_hash(slower) == content_hash(run) == content_hash(make_run())
+    with h5py.File(write_run(tmp_path / "a.h5", slower, provenance={"command": "other"})) as file:
+        assert file.attrs["content_hash"] == content_hash(run)
+    moved = make_run()
+    moved.q[3, 1] = np.nextafter(moved.q[3, 1], np.inf)  # one unit in the last place
+    assert content_hash(moved) != content_hash(run)
+
+
+def test_xarray_opens_it_with_units_and_dimensions_and_numbers_are_checksummed(tmp_path, make_run):
+    run = make_run()
+    path = write_run(tmp_path / "run.h5", run)
+    with xarray.open_datatree(path, engine="h5netcdf") as tree:
+        assert set(tree.children) >= {"scene", "law", "trajectory", "steps", "contacts", "impacts", "energy"}
+        for node in tree.subtree:
+            for name, variable in node.dataset.data_vars.items():
+                assert not any(str(dim).startswith("phony") for dim in variable.dims), f"{node.path}/{name}"
+                assert variable.ndim == 0 or "units" in variable.attrs, f"{node.path}/{name}"
+        velocity = tree["trajectory/v"]
+        assert velocity.dims == ("time", "velocity") and velocity.attrs["units"] == "m/s, m/s, rad/s"
+        np.testing.assert_array_equal(velocity.sel(velocity="peg.y"), run.v[:, 1])
+        np.testing.assert_array_equal(tree["trajectory"].dataset["time"], run.time)
+        assert tree["trajectory"].dataset["time"].attrs["units"] == "s"
+        assert tree["energy/kinetic"].attrs["units"] == "J"
+        assert str(tree["scene/source"].values) == run.scene_source
+
+    def check(name, item):
+        if isinstance(item, h5py.Dataset) and h5py.check_string_dtype(item.dtype) is None:
+            assert item.fletcher32 and item.shuffle and item.compression == "gzip", name
+
+    with h5py.File(path) as file:
+        file.visititems(check)
+
+
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(place=st.floats(0, 1, exclude_max=True), flip=st.integers(0, 255))
+def test_a_file_with_a_damaged_byte_or_cut_short_is_refused_by_name(tmp_path, make_run, place, flip):
+    path = write_run(tmp_path / "run.h5", make_run(), provenance={}, replace=True)
+    content = bytearray(path.read_bytes())
+    at = int(place * len(content))
+    content[at] ^= flip
+    path.write_bytes(content if flip else content[:at])
+    with pytest.raises(RunFileError) as refused:
+        read_run(path)
+    assert str(path) in str(refused.value)
+
+
+def edited(edit, whole):
+    """The file after somebody else's program."""
+    stream = io.BytesIO(whole)
+    with h5py.File(stream, "a") as file:
+        edit(file)
+    return stream.getvalue()
+
+
+def move(file):
+    file["trajectory/q"][2, 1] += 1e-12
+
+
+def of_version(version, whole):
+    return sealed(edited(lambda file: file.attrs.update(format_version=version), whole))
+
+
+def foreign(whole):
+    return edited(lambda file: file.create_dataset("x", data=1), b"")
+
+
+def flipped(whole):
+    """Another byte in a chunk of numbers, under a seal that holds."""
+    content = bytearray(whole)
+    with h5py.File(io.BytesIO(whole)) as file:
+        chunk = file["trajectory/q"].id.get_chunk_info(0)
+    content[chunk.byte_offset + chunk.size // 2] ^= 1
+    return sealed(bytes(content))
+
+
+@pytest.mark.parametrize(("wrong", "said"), [
+    (None, "no such file"), (lambda whole: b"", ""), (lambda whole: whole + b"tail", ""), (lambda whole: whole[:8], ""),
+    (lambda whole: b"time,x\n0,1\n", ""), (partial(of_version, FORMAT_VERSION - 1), ""),
+    (partial(of_version, FORMAT_VERSION + 1), ""), (foreign, "not written by iapb"),
+    (lambda whole: sealed(foreign(whole)), "expected 'iapb run'"), (flipped, "filter"),  # HDF5's own checksum
+    (partial(edited, move), "no checksum"), (lambda whole: sealed(edited(move, whole)), "content hash"),
+])  # fmt: skip
+def test_other_contents_and_versions_are_refused_by_name(wrong, said, tmp_path, make_run):
+    path = write_run(tmp_path / "run.h5", make_run())
+    if wrong is None:
+        path.unlink()
+    else:
+        path.write_bytes(wrong(path.read_bytes()))
+    with pytest.raises(RunFileError, match=f"{path.name}.*{said}"):
+        read_run(path)
+
+
+def test_provenance_is_complete_and_names_no_machine(tmp_path, make_run):
+    facts = collect_provenance(seeds=(3, 4))
+    assert read_provenance(write_run(tmp_path / "run.h5", make_run(), provenance=facts)) == facts
+    for name in ("version", "commit", "dirty", "lock", "cpu", "blas", "numba", "seeds", "command"):
+        assert facts[name]
+    text = " ".join(facts.values())
+    assert str(Path(__file__).parents[2]) not in text and str(Path.home()) not in text
+    assert platform.node() == "" or platform.node() not in text.split()
+
+
+def test_a_table_comes_back_and_xarray_reads_it(tmp_path):
+    path = write_table(tmp_path / "t.h5", "fig03", TABLE, title="Figure 3", command="iapb sweep")
+    found = read_table(path, "fig03")
+    assert found.titles == TABLE.titles and found["world"] == ["A", "ä"] and found["energy"] == [0.5, 0.25]
+    assert found["rank"][1] == 2.0 and found["rank"][0] != found["rank"][0]
+    assert read_table(write_table(path, "bare", titled(("x",)))).rows == ()
+    write_table(path, "fig03", TABLE)
+    with xarray.open_dataset(path, engine="h5netcdf", group="fig03") as dataset:
+        assert dataset["energy"].dims == ("point",) and dataset["energy"].attrs["units"] == "J"
+        assert float(dataset["energy"].sel(point=1)) == 0.25
+    with pytest.raises(RunFileError, match="did you mean|expected"):
+        read_table(path, "third")
+
+
+def test_records_come_back_and_damage_is_found(tmp_path):
+    record = {"é": [1, 0.1, None, "a"]}
+    path = write_record(tmp_path / "r.h5", record, "Records")
+    assert read_record(path) == record
+    content = path.read_bytes()
+    path.write_bytes(content[:-100])
+    with pytest.raises(RunFileError, match="checksum"):
+        read_record(path)
+    path.write_bytes(content)
+    with h5py.File(path, "r+") as file:
+        del file["records"]
+        file["records"] = 1
+    path.write_bytes(sealed(path.read_bytes()))
+    with pytest.raises(RunFileError, match="records is missing"):
+        read_record(path)
+
+
+# What a key covers: every input, every line of code that can change a number, and no comment
+
+INPUTS = {"scene": {"name": "peg", "rate": 512}, "law": "IAPB", "settings": {"restitution": np.float64(0.0)}}
+CODE = '''"""What it does."""
+LIMIT = 3.0  # [N]
+
+@njit
+def force(x):
+    """Return the force."""
+    return 2.0 * x
+'''
+
+
+def test_every_input_and_the_code_enter_the_key_but_not_order_and_type():
+    changed = [INPUTS, INPUTS | {"law": "PB"}, INPUTS | {"scene": {"name": "peg", "rate": 1000}},
+               INPUTS | {"settings": {"restitution": 5e-324}}, INPUTS | {"extra": None}]  # fmt: skip
+    assert len({run_key(inputs) for inputs in changed} | {run_key(INPUTS, code="mine")}) == len(changed) + 1
+    reordered = {"settings": {"restitution": 0.0}, "law": "IAPB", "scene": {"rate": 512, "name": "peg"}}
+    assert run_key(reordered) == run_key(INPUTS)
+    with pytest.raises(ArgumentError, match="value"):
+        run_key({"law": object()})
+
+
+@pytest.mark.parametrize(("old", "new", "same"), [
+    ("What it does.", "Does it.", True), ('    """Return the force."""\n', "", True), ("  # [N]", "", True),
+    ("return 2.0 * x", "return (2.0\n            * x)", True), ("2.0", "2.5", False), ("2.0 * x", "x * 2.0", False),
+    ("@njit\n", "", False), ("LIMIT = 3.0", "LIMIT = 3", False), ("(x)", '(x="a text")', False),
+])  # fmt: skip
+def test_code_enters_a_key_and_words_do_not(old, new, same):
+    assert old in CODE
+    assert (keys.code_hash(CODE.replace(old, new).encode()) == keys.code_hash(CODE.encode())) is same
+
+
+def test_a_changed_added_or_removed_file_changes_the_key_whatever_is_remembered(tmp_path, monkeypatch):
+    monkeypatch.setattr(keys, "_ROOT", tmp_path)
+    monkeypatch.setattr(keys, "__file__", str(tmp_path / "keys.py"))
+    folder = tmp_path / "engine"
+    folder.mkdir()
+    with pytest.raises(ArgumentError, match="engine"):  # renamed, it would otherwise leave every key
+        keys.sources_hash.__wrapped__("engine")
+
+    def version(**files):
+        for name, text in files.items():
+            (folder / f"{name}.py").write_text(text)
+        return str(keys.sources_hash.__wrapped__("engine"))
+
+    first = version(a=CODE)
+    found = [first, version(a=CODE.replace("2.0", "2.5")), version(b="")]
+    (folder / "b.py").rename(folder / "c.py")
+    assert len({*found, version()}) == 4
+    (folder / "c.py").unlink()
+    [kept] = tmp_path.rglob("code-*.json")
+    for text in ("", "[1]", "{", '{"x": 1}'):
+        kept.write_text(text)
+        assert version(a=CODE.replace("Return", "Returns")) == first
+    monkeypatch.setattr(keys, "code_hash", lambda source: pytest.fail("parsed again"))
+    assert version() == first

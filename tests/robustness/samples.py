@@ -1,0 +1,67 @@
+"""Files as iapb and others write them, for tests that damage or forge them."""
+
+import os
+import tempfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from iapb import find_scene, load_scene
+from reference.complementarity.problem import ImpactProblem
+from reference.datasets import _write_rows, write_fclib
+from reference.worlds import run_world
+from reports.store import RunStore
+from reports.store.tables import write_table
+from verification.table import titled
+
+TIMES = int(os.environ.get("IAPB_FUZZ", "1"))  # how often each fault is done, and a multiple of the wrong inputs
+
+
+@cache
+def sample_run():
+    """The run itself, simulated once per process."""
+    return run_world(load_scene(find_scene("peg_corner")).with_values({"duration": 0.4}), "IAPB")
+
+
+def numbered(number):
+    """A run that differs from the others in its results."""
+    return replace(sample_run(), q=sample_run().q + float(number))
+
+
+def open_store(folder):
+    """A store whose keys do not depend on the code: hashing that takes longer than what is tried here."""
+    return RunStore(folder, code="faults")
+
+
+def put(folder, number=0):
+    """Store the run of that number."""
+    return open_store(folder).put({"number": number}, numbered(number), "sample")
+
+
+@cache
+def result_files():
+    """A short run, and a table."""
+    with tempfile.TemporaryDirectory() as folder:
+        run, table = put(Path(folder)), Path(folder) / "table.h5"
+        write_table(table, "sample", titled(("x [m]", "word"), [(0.5, "a"), (1.5, "b")]))
+        return {"run.h5": run.read_bytes(), "table.h5": table.read_bytes()}
+
+
+@cache
+def fclib_files():
+    """A local and a global problem with friction."""
+    rng = np.random.default_rng(0)
+    problem = ImpactProblem.from_impact(np.eye(6), rng.normal(size=(6, 6)), rng.normal(size=6), 0.0, [0.3, 0.5])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "local.hdf5"
+        write_fclib(path, problem, "sample", np.ones(6))
+        with h5py.File(path.with_name("global.hdf5"), "w") as file:
+            group = file.create_group("fclib_global")
+            _write_rows(group.create_group("M"), np.eye(6))
+            _write_rows(group.create_group("H"), rng.normal(size=(6, 3)))
+            group["vectors/f"], group["vectors/w"], group["vectors/mu"] = np.ones(6), np.zeros(3), np.array([0.3])
+            group["spacedim"], group["info/title"] = np.array([3], np.int32), np.bytes_("sample")
+        return {each.name: each.read_bytes() for each in sorted(path.parent.iterdir())}
