@@ -1,4 +1,4 @@
-"""Kernels that kernels call leave bitcode only, and the caller has all that it needs."""
+"""A kernel has all that it calls, and shares no name with other libraries."""
 
 from __future__ import annotations
 
@@ -48,13 +48,7 @@ def _sum(values: Any) -> Any:
     return total - _entry(values, 0) * _entry(values, 0)
 
 
-def test_the_caller_has_all_that_it_calls_and_only_it_becomes_machine_code() -> None:
-    assert _sum(np.array([1.0, 2.0, 3.0])) == 4.0 + 9.0
-    assert len(_sum.overloads) == 1 and not _square.overloads and not _squared_if.overloads and not _entry.overloads
-    assert _entry(np.array([3, 4]), 1) == 4 and len(_entry.overloads) == 1  # Python can call the inner kernel, too
-
-
-def test_what_is_not_inlined_has_no_name_that_another_library_could_be_given(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_kernel_calls_is_inlined_or_has_no_name_for_other_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     """The loader would take it for its own of that name, though LLVM may have changed how it is called."""
     monkeypatch.setattr("iapb.inlining._INLINE_UP_TO", -10_000)
     caller = compile_as_whole(_sum.py_func)

@@ -114,11 +114,6 @@ def test_the_choices_of_the_caller_switch_the_effect(
     assert (found.active, found.ignores) == (on, ignores) and reason in found.reason
 
 
-def test_gravity_names_what_would_not_fall() -> None:
-    lift = {"name": "lift", "joint": "prismatic", "axis": [0, 1], "mass": 1}
-    assert effect(PENDULUM.with_values({"bodies": [*SLIDER, lift]}), "gravity").left_out.startswith("lift would")
-
-
 def test_laws_and_couplings_are_known_by_name_and_an_unknown_law_uses_all() -> None:
     assert decide_effects(PEG, "my law") == decide_effects(PEG)
     for law in (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty()):

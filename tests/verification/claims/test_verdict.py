@@ -84,13 +84,6 @@ def test_the_outcome_of_a_claim_follows_from_the_parts_that_the_paper_states(par
     assert added.outcome == (outcome if FAILS in outcome else "not computed")
 
 
-def test_a_part_gets_its_role_and_its_words_from_the_check():
-    claim = replace(CLAIM, roles={"x": BEYOND}, named={"y": "rotation"})
-    x, y = claim.conclude(claim.table_of([{"part": "x", "error": 2.0}, {"part": "y", "error": 2.0}])).parts
-    assert (x.role, x.named, y.role, y.named) == (BEYOND, "", "", "rotation")
-    assert x.outcome == "fails (beyond the paper)" and y.outcome == "fails"
-
-
 CLAIM = Check(key="C99", question="?", cases=lambda study: (), row=lambda study, case: case, parts=["part"],
               conditions=["tilt"], holds=lambda row: row["error"] < 1.0, says=lambda table: "Found.")  # fmt: skip
 

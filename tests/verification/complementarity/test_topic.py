@@ -13,7 +13,7 @@ from reference.datasets import StoredProblem, write_fclib
 from verification.check import Study
 from verification.complementarity import extensions
 from verification.complementarity.extensions import BAR, FRICTION, LAW_OF_UNEQUAL, UNEQUAL
-from verification.complementarity.solvers import FACTORS, collections, own_problems, study_read
+from verification.complementarity.solvers import FACTORS, collections, study_read
 from verification.complementarity.topic import REFERENCES
 from verification.cost import solvers as timings
 from verification.cost.calls import PRINTED
@@ -107,11 +107,3 @@ def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fail
     larger = ImpactProblem.from_delassus(np.eye(2), [-1.0, -1.0], name="larger")
     lines = study_read("few", [StoredProblem(larger), StoredProblem(unsolvable)], longest=0.0).lines
     assert {line["daqp"] for line in lines} == {"failed", "left out"} and "solved" not in lines[1].values()
-
-
-def test_own_problems_are_named_apart_and_are_of_both_kinds() -> None:
-    own = [stored.problem for stored in own_problems()]
-    assert len({problem.name for problem in own}) == len(own)
-    assert {problem.friction is None for problem in own} == {True, False}
-    hyperstatic = [p for p in own if np.linalg.matrix_rank(p.delassus, hermitian=True) < p.size]
-    assert len(hyperstatic) >= 10
