@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from iapb.double_double import add_product, kinetic_energies, quadratic_forms, two_product, two_sum
 from iapb.elementary import arc_tangent, hypotenuse, sine_cosine
-from iapb.linalg import product
 
 NUMBERS = np.random.default_rng(8)
 ANGLES = np.concatenate([
@@ -100,12 +99,3 @@ def test_energies_and_quadratic_forms_are_right_to_the_last_digits(seed: int) ->
     for value, other in zip(quadratic_forms(mass, before, step), (before, step), strict=True):
         exact = exact_form(mass, other, step)
         assert abs(Fraction(value) - exact) <= abs(exact) / 2**50 + Fraction(1, 2**95)
-
-
-def test_products_of_integers_are_exact() -> None:
-    numbers = np.random.default_rng(1)
-    a, b = numbers.integers(-9, 10, (4, 3)), numbers.integers(-9, 10, (3, 5))
-    np.testing.assert_array_equal(product(a, b), a @ b)
-    np.testing.assert_array_equal(product(b.T, a[0]), b.T @ a[0])
-    assert product(np.zeros((0, 3)), b).shape == (0, 5)
-    assert (product(np.zeros((2, 0)), np.zeros(0)) == 0.0).all()

@@ -11,15 +11,12 @@ from iapb.mechanics.structure import principal_axes
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.mechanism import mechanism_of
-from iapb.scene.model import scene_kind
 from iapb.simulation import simulate
+from tests.iapb.contact.paper import scene_of
 
 
 def scene(*bodies: dict[str, Any], **values: Any) -> Scene:
-    given = {"name": "free", "rate": 1000.0, "duration": 1.0, "dimensions": 3, "bodies": list(bodies)} | values
-    if given["dimensions"] == 2:
-        del given["dimensions"]
-    return scene_kind(given).model_validate(given)
+    return scene_of(list(bodies), [], **{"duration": 1.0} | values)
 
 
 def body(spin: float, **values: Any) -> dict[str, Any]:
@@ -42,7 +39,7 @@ CASES = {
     "a ball": scene(body(1000.0, inertia=[4e-3] * 3)),
     "its centre elsewhere": scene(body(50.0, center_of_mass=[0.1, -0.2, 0.05])),
     "turned inertia": scene(body(50.0, inertia=[[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]])),
-    "a floating robot": scene(*ROBOT), "a planar one": scene(*FLAT_ROBOT, dimensions=2),
+    "a floating robot": scene(*ROBOT), "a planar one": scene(*FLAT_ROBOT),
 }
 
 
