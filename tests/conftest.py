@@ -27,10 +27,10 @@ if config.DISABLE_JIT:
 
 
 def compile_alone(dispatcher: Any, signature: Any, plain: Any = Dispatcher.compile) -> Any:
-    """Compile a kernel while no other worker does: the others wait, and read it from numba's cache."""
+    """Compile a kernel of the engine while no other worker does: the others wait, and read it from numba's cache."""
     import fcntl
 
-    if dispatcher._cache.cache_path is None:
+    if dispatcher._cache.cache_path is None or not dispatcher.py_func.__module__.startswith("iapb."):
         return plain(dispatcher, signature)
     folder = Path(dispatcher._cache.cache_path)
     folder.mkdir(parents=True, exist_ok=True)
