@@ -26,6 +26,7 @@ from reports.store.parts import Parts
 from reports.store.runs import store_run
 from reports.store.schema import FORMAT_VERSION, GROUPS, RESULT_GROUPS
 from reports.store.tables import write_record
+from tests.reports.made_up import flipped
 from verification.table import titled
 
 SHORT = {"duration": 0.05}
@@ -49,13 +50,6 @@ def filled(two_runs, tmp_path):
 
 def runs(folder):
     return sorted((folder / "runs").glob("*.h5"))
-
-
-def flipped(content):
-    """One bit of a file is another."""
-    changed = bytearray(content)
-    changed[len(changed) // 2] ^= 1
-    return bytes(changed)
 
 
 def aged(path):
@@ -164,7 +158,7 @@ def strew(folder, run, first):
     with h5py.File(noted, "w") as file:  # speaks of us, and is not ours
         file.attrs.update({"format": "a note", "format_version": 4, "tool": "made with: iapb run peg_corner"})
     noted = noted.getvalue()
-    contents = (flipped(run), noted, b"somebody else's", b"", run[: len(run) // 2], run[:-91], sealed(noted),
+    contents = (noted, b"somebody else's", flipped(run), b"", run[: len(run) // 2], run[:-91], sealed(noted),
                 sealed(b"text"), part, sealed(b"x" + part), bytes(range(256)), b"\x89HDF\r\n\x1a\n", run + b"more")
     names = ("{}.h5", "mine{}-0123456789abcdef.h5", ".x{}.h5.77.writing", "big{}.iso.partial", "x{}.h5.damaged",
              "mine{}-0123456789abcdef.h5.partial", "mine{}-0123456789abcdef.h5.damaged", "notes{}.txt",
@@ -179,7 +173,7 @@ def strew(folder, run, first):
                 path.write_bytes(content)
         (place / ".twin.h5.77.writing").hardlink_to(folder / "1.h5")
         (place / "link.h5").symlink_to(place / "0.h5")
-        (place / "new\nline.h5").write_bytes(contents[0])
+        (place / "new\nline.h5").write_bytes(flipped(run))
         os.mkfifo(place / "pipe.h5")
         os.mkfifo(place / ".p.h5.1.writing")
     for path in folder.rglob("*"):

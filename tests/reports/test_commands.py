@@ -215,10 +215,9 @@ def test_json_has_the_keys_that_the_documents_list(answer, here):
     drawings = found["reproduce --figure"]["drawings"]
     assert drawings and all(Path(each).is_file() for each in drawings)
     assert set(answer("store", "repair", "runs")[1]) == {"files", "count", "logs", "aside"}
-    assert answer("store", "check", "runs") == (0, {"files": answer("store", "check", "runs")[1]["files"],
-                                                    "count": {"whole": 1}})  # fmt: skip
-    damaged = Path(ran["file"])
-    damaged.write_bytes(damaged.read_bytes()[:5000])
+    status, whole = answer("store", "check", "runs")
+    os.truncate(ran["file"], 5000)
+    assert (status, set(whole), whole["count"]) == (0, {"files", "count"}, {"whole": 1})
     assert answer("store", "check", "runs")[1]["count"] == {"damaged": 1}
     assert answer("compare", "--export", "ours")[1]["problems"] == len(list(here.glob("ours/*.hdf5"))) > 3
 

@@ -20,12 +20,13 @@ from reports.evidence import stage as stages
 from reports.evidence.stage import Stage
 from reports.evidence.topics import Plan
 from reports.figures.figure import Figure, Panel, Recipe
+from reports.pages.builder import FIRST_PAGE, build_report
 from reports.pages.records import Evidence, FailedCases
 from reports.provenance import UNKNOWN, dispatched, linear_algebra, this_machine
 from reports.report import keep_answer, kept_answer, report_key
 from reports.runner import Runner
 from reports.store import keys
-from tests.reports.made_up import joined
+from tests.reports.made_up import flipped
 from verification.claims import arm
 from verification.cost import effects
 from verification.finding import NOT_COMPUTED, VERDICTS, Finding, Part, failure_of, finding_of
@@ -125,9 +126,7 @@ def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path):
     assert wrong.records is None and wrong.failures[0].error == "ValidationError"
     assert not list(tmp_path.rglob("tables/*.h5"))
     path = filled(tmp_path, lambda _: FINDING).path
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 0xFF
-    path.write_bytes(bytes(content))
+    path.write_bytes(flipped(path.read_bytes()))
     damaged = filled(tmp_path, lambda _: FINDING)
     assert damaged.records is None and damaged.failures[0].error == "RunFileError"
 
@@ -171,7 +170,8 @@ def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypa
     stage, again = (Stage(tmp_path / "tables", "engines", Finding, "quick") for _ in range(2))
     topic = gather._failed(gather._fill(stage, Runner(tmp_path / "runs"), "quick", nothing))
     assert topic.key == "engines" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
-    first = joined(Evidence(topics=(topic,)), ()).split('<section id="verdict"')[1].split("</section>")[0]
+    page = build_report(Evidence(topics=(topic,)), ())[FIRST_PAGE]
+    first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert "Not computed, after RuntimeError: the disk went away." in first and "and more" not in first
     with pytest.raises(KeyboardInterrupt):
         gather._fill(again, Runner(tmp_path / "runs"), "quick", nothing)

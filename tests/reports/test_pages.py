@@ -12,6 +12,7 @@ import pytest
 
 from iapb.errors import ArgumentError
 from reports import report
+from reports.figures import RECIPES
 from reports.figures.figure import Figure, Panel, Recipe, cell, grid
 from reports.figures.paper import arm_energies
 from reports.pages.builder import FIRST_PAGE, ROWS_SHOWN, badge_words, build_report, link_across, worst_first
@@ -22,7 +23,6 @@ from reports.pages.records import Evidence, StoredFile
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import TERMS, explained, readable, terms_of
 from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
-from tests.reports.made_up import joined
 from verification import finding
 from verification.claims import CLAIMS
 from verification.claims.conditions import FULL_GRID
@@ -62,6 +62,11 @@ class Outline(HTMLParser):
     def handle_endtag(self, tag):
         if not self.open or self.open.pop() != tag:
             self.wrong.append(tag)
+
+
+def joined(evidence, recipes=RECIPES):
+    """Every page as one text, the first page first, for tests that ask what is said and not where."""
+    return "\n".join(build_report(evidence, recipes).values())
 
 
 def one(key, *parts, said="a", **more):

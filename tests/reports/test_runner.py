@@ -26,6 +26,7 @@ from reports.store.io import mark_store, sealed
 from reports.store.parts import Parts, PartsLocked, parts_of, read_parts
 from reports.store.runs import opened_run, read_entry
 from reports.uses import parsed, run_command
+from tests.reports.made_up import flipped
 from verification.check import Study
 
 WHOLE = load_scene(find_scene("peg_corner"))
@@ -238,12 +239,6 @@ def killed(tmp_path, a_part_for_every_chunk):
     return parts, scene
 
 
-def flip(path, share):
-    content = bytearray(path.read_bytes())
-    content[int(share * len(content))] ^= 1
-    path.write_bytes(content)
-
-
 def exchange(one, other):
     shutil.copy(one, one.with_name("x"))
     shutil.copy(other, one)
@@ -253,8 +248,8 @@ def exchange(one, other):
 HARMS = {
     "cut": lambda one, other: os.truncate(one, one.stat().st_size // 2),
     "cut to nothing": lambda one, other: os.truncate(one, 0),
-    "damaged in its line": lambda one, other: flip(one, 0.01),
-    "damaged in its numbers": lambda one, other: flip(one, 0.7),
+    "damaged in its line": lambda one, other: one.write_bytes(flipped(one.read_bytes(), 0.01)),
+    "damaged in its numbers": lambda one, other: one.write_bytes(flipped(one.read_bytes(), 0.7)),
     "lost": lambda one, other: one.unlink(), "doubled": lambda one, other: shutil.copy(other, one),
     "exchanged": exchange,
 }  # fmt: skip
@@ -278,7 +273,7 @@ def test_what_is_cut_off_damaged_lost_doubled_or_exchanged_is_computed_again(kil
         assert streamed.resumed_at == 512 * kept and read_entry(place.path).content_hash == right
         place.path.unlink()
     shutil.copytree(whole, parts)
-    flip(parts / names[0], 0.5)
+    (parts / names[0]).write_bytes(flipped((parts / names[0]).read_bytes()))
     with pytest.raises(RunFileError, match="first part"):
         Runner(parts.parent).stream(scene, "IAPB", resume=True)
     _, streamed = Runner(parts.parent).stream(scene, "IAPB")
