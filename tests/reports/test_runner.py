@@ -292,7 +292,7 @@ def test_parts_of_another_run_or_of_nobody_are_refused_and_left(killed, tmp_path
     theirs = parts_of(place.path) / "00000001.part"
     theirs.parent.mkdir()
     theirs.write_text("somebody else's")
-    for resume, said in ((True, ""), (False, "only 0 of")):
+    for resume, said in ((True, None), (False, "only 0 of")):
         with pytest.raises(RunFileError, match=said):
             Runner(tmp_path).stream(other, "IAPB", resume=resume)
     assert theirs.read_text() == "somebody else's" and not place.path.exists()
