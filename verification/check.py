@@ -20,6 +20,7 @@ from iapb.scene import Scene, find_scene, load_scene
 from reference.worlds import run_world
 from verification.finding import (
     NOT_COMPUTED,
+    NOT_TESTABLE,
     Failure,
     Finding,
     Part,
@@ -99,6 +100,7 @@ class Check:
         that count the cases of a row, that depend on measured times, and that are sentences (see `Column`)
     roles : MISPRINT or BEYOND for each part, or value of a column of `parts`, that is not the statement of the question
     named : the words for a part, or value of a column of `parts`, in an outcome such as "fails in rotation"
+    untested : what the paper states and no case tests; each is a part that cannot tell
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no fresh cases
     prepare : (study, cases), called before the first row, for example to compute on several cores
     rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure refutes
@@ -122,6 +124,7 @@ class Check:
     prose: Collection[str] = ()
     roles: Mapping[str, str] = field(default_factory=dict, hash=False)
     named: Mapping[str, str] = field(default_factory=dict, hash=False)
+    untested: Sequence[str] = ()
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
     prepare: Callable[[Study, Sequence[Any]], object] | None = None
     rule: Callable[[Iterable[bool | None]], str] = verdict_of_law
@@ -161,7 +164,7 @@ class Check:
 
     def conclude(self, table: Table, study: Study | None = None) -> Finding:
         """Return the finding on a claim from its judged table; without a study it draws no fresh cases."""
-        parts = []
+        parts = [Part("No case tests it.", NOT_TESTABLE, name) for name in self.untested]
         for name, rows in by_part(table).items():
             role = _of_part(self.roles, name)
             judged = judge_part(name, rows, None if role else self._fresh(study, name))  # a role decides nothing

@@ -58,11 +58,12 @@ class Region:
 
 def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
     key = key.replace("_", " ")
+    least, most = ("" if end is None else f"{end:g}" if len(f"{end:g}") <= 5 else f"{end:.3g}" for end in (low, high))
     if low == high:
-        return f"{key} = {low:g} {unit}".rstrip()
-    if low is None:
-        return f"{key} <= {high:g} {unit}".rstrip()
-    return f"{key} >= {low:g} {unit}".rstrip() if high is None else f"{low:g} <= {key} <= {high:g} {unit}".rstrip()
+        return f"{key} = {least} {unit}".rstrip()
+    if not least:
+        return f"{key} <= {most} {unit}".rstrip()
+    return f"{least} <= {key} <= {most} {unit}".rstrip() if most else f"{key} >= {least} {unit}".rstrip()
 
 
 def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:
@@ -73,6 +74,9 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
     first = np.zeros(len(trials.rows), np.bool_)
     first[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
     region = search_region(trials.only(first))
+    if region is None and fresh is None:  # all of this half may hold: search the other
+        first = ~first
+        region = search_region(trials.only(first))
     inside = trials.only(not searched and region is not None and region.contains(row)
                          for searched, row in zip(first, trials.records(), strict=True))  # fmt: skip
     if region is None or False in inside.holds:

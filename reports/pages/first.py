@@ -95,8 +95,8 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
     found = {"if the device can give any force": table.where(part=LARGE)}
     if limits is not None and "force_limit" in limits.keys:
         found["on the paper's device, which gives at most 15 N"] = limits.where(force_limit=1.0)
-    ratios = {device: [row["IAPB"] / row["PB"] for row in rows.records() if row["coordinate"] != "theta" and row["PB"]]
-              for device, rows in found.items()}  # fmt: skip
+    ratios = {device: [row["IAPB"] / row["PB"] for row in rows.records()
+                       if row["coordinate"] != "rotation" and row["PB"]] for device, rows in found.items()}  # fmt: skip
     said = [f"{median(each):.2g} times as large {device} (median of {len(each)} cases)"
             for device, each in ratios.items() if each]  # fmt: skip
     if said:

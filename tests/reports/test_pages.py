@@ -270,11 +270,11 @@ def told(*claims, topics=()):
 
 
 def test_the_answer_is_made_from_the_claims():
-    rows = ((LARGE, "x", 10.0, 1.0), (LARGE, "y", 6.0, 2.0), (LARGE, "x", 8.0, 1.0), (LARGE, "theta", 1.0, 1.0))
+    rows = ((LARGE, "x", 10.0, 1.0), (LARGE, "y", 6.0, 2.0), (LARGE, "x", 8.0, 1.0), (LARGE, "rotation", 1.0, 1.0))
     forces = one("C11", tables={"C11": titled(("part", "coordinate", "IAPB", "PB"), rows)})
-    clipped = ((0.3, "x", 1.0, 1.0), (1.0, "x", 4.0, 1.0), (1.0, "y", 2.0, 1.0), (1.0, "theta", 9.0, 1.0))
+    clipped = ((0.3, "x", 1.0, 1.0), (1.0, "x", 4.0, 1.0), (1.0, "y", 2.0, 1.0), (1.0, "rotation", 9.0, 1.0))
     table = titled(("force_limit", "coordinate", "IAPB", "PB"), clipped).judged(lambda row: True)
-    x, turned = Part("s.", finding.WHERE, "x", 40, 40), Part("s.", REFUTED, "theta", 1, 40, named="rotation")
+    x, turned = Part("s.", finding.WHERE, "x", 40, 40), Part("s.", REFUTED, "rotation", 1, 40, named="rotation")
     ours = Part("s.", REFUTED, "x, larger", 0, 9, role=finding.BEYOND)
     said = told(one("C10", x, turned, ours), forces, one("C14", tables={"C14": table}))
     assert "8 times as large if the device can give any force (median of 3 cases), and 3 times" in said["Holds"]

@@ -15,6 +15,7 @@ from verification.table import Row, Table
 
 BOTH = "both filters, coherence distance above speed × step (the paper's condition)"
 COHERENCE_ALONE, CLUSTERING = "coherence alone", "clustering alone"
+JUMP, REACH = "jump to the next facet", "relative coherence distance"
 FACETS = (9, 18, 30, 60)  # in a right angle: 10° to 1.5° each
 CLUSTER = {"quick": (4.0,), "full": (4.0, 10.0)}  # [mm], more than the contacts at an edge are apart
 COHERENCE = (1.1, 1.5, 2.0, 3.0, 4.0, 6.0)  # of speed × step
@@ -36,8 +37,9 @@ class Socket(NamedTuple):
     def conditions(self) -> Row:
         """The conditions as cells of a row."""
         jump = edge_jump(self.facets) * self.rate / LARGEST_SPEED
-        return {"facet jump [of speed × step]": jump, "coherence distance [of speed × step]": self.coherence,
-                "reach [of facet jump + speed × step]": self.coherence / (1.0 + jump),
+        return {f"{JUMP} [times speed × step]": jump,
+                "coherence distance [times speed × step]": self.coherence,
+                f"{REACH} [times (jump + speed × step)]": self.coherence / (1.0 + jump),
                 "cluster distance [mm]": self.cluster, "damping [N s/m]": self.damping, "rate [Hz]": self.rate}
 
 
@@ -79,7 +81,7 @@ def _found(study: Study, case: Socket) -> dict[str, Any]:
 
 def _says(table: Table) -> str:
     both, clustering = (table.where(part=part) for part in (BOTH, CLUSTERING))
-    reaching, short = (both.only((reach >= 1.0) is far for reach in both.column("reach")) for far in (True, False))
+    reaching, short = (both.only((reach >= 1.0) is far for reach in both[REACH]) for far in (True, False))
     collisions, unfiltered, doubled, all_contacts = (
         sorted(clustering.column(f"{kind}{without}"))[len(clustering.rows) // 2] if clustering.rows else "no"
         for kind in ("false collisions", "doubled contacts") for without in ("", " without filters"))
@@ -102,12 +104,12 @@ C18 = Check(
     key="C18", question="Clustering and temporal coherence remove false collisions.", place="Section III",
     quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. The facets "
     "approximate a round socket, in which a rolling ball does not collide again; so each collision is false. Speed: "
-    "the largest of a ball that rolls without loss. Facet jump: distance between the contacts at an edge. Reach: "
-    "coherence distance as a multiple of facet jump + speed × step.",
+    "the largest of a ball that rolls without loss. Jump to the next facet: distance between the contacts at an "
+    "edge.",
     tolerance="No false collision remains. A trial without any when both filters are off cannot tell.",
     cases=_cases, row=_row, says=_says, draw=_draw, parts=["part"],
     holds=lambda row: bool(row["false collisions"] == 0) if row["false collisions without filters"] else None,
     roles={COHERENCE_ALONE: BEYOND, CLUSTERING: BEYOND},
-    conditions=["facet jump", "coherence distance", "reach", "cluster distance", "damping", "rate"],
-    axes=("facet jump", "coherence distance", "damping"),
+    conditions=[JUMP, "coherence distance", REACH, "cluster distance", "damping", "rate"],
+    axes=(JUMP, "coherence distance", "damping"),
 )  # fmt: skip

@@ -6,16 +6,17 @@ test can write one by hand.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from iapb.run import Run
 from reference import Floats
 
-COORDINATES = ("x", "y", "theta")
+COORDINATES = ("x", "y", "rotation")
 HALF_SIZE = (0.0105, 0.00525)  # of the peg of Fig. 4 [m]
 
 # The device has settled if it is slower than this in every coordinate: 1 mm/s and 0.01 rad/s are below a hundredth of
@@ -40,7 +41,8 @@ class Trace:
     hand_force : (n, 3) [N, N m]
     penetration : (n,) deepest overlap in the step [m], zero without overlap
     new_contact : (n,) whether a contact began in the step
-    impact_step : (k,) steps with a collision; energy_lost : (k,) [J]; impact_scale : (k,) share of the impulse
+    impact_step : (k,) steps with a collision; energy_lost : (k,) [J]; impact_scale : (k,) share s of the impulse
+    misfit : (k,) largest |J v⁺ + e′ J v⁻| of an impact with e′ = s (1 + e) − 1, relative to the largest |J v⁻|
     kinetic_energy : (n + 1,) of the tool [J]
     """
 
@@ -55,6 +57,7 @@ class Trace:
     impact_step: NDArray[np.int64]
     energy_lost: Floats
     impact_scale: Floats
+    misfit: Floats
     kinetic_energy: Floats
 
     @property
@@ -79,8 +82,25 @@ def trace_of(run: Run) -> Trace:
     inertia = np.array([body["mass"], body["mass"], body["inertia"]])
     return Trace(
         run.time, run.device_q, run.q, run.device_v, run.device_force, run.hand_force, penetration, new_contact,
-        run.impacts.step, run.impacts.energy_lost, run.impacts.scale, 0.5 * (run.v**2) @ inertia,
+        run.impacts.step, run.impacts.energy_lost, run.impacts.scale, np.array([*_misfits(run)]),
+        0.5 * (run.v**2) @ inertia,
     )  # fmt: skip
+
+
+def colliding_rows(run: Run, step: int, v: Floats) -> Floats:
+    """Return the rows of J of the recorded contacts of a step that collide at the velocity v; it uses no resolver."""
+    here, slow = slice(*run.contacts.offsets[step : step + 2]), run.scene_resolved["contact"]["approach_velocity"]
+    (x, y), n = (run.contacts.point[here, :2] - run.q[step, :2]).T, run.contacts.normal[here]
+    rows = np.column_stack([n[:, 0], n[:, 1], x * n[:, 1] - y * n[:, 0]])
+    return np.asarray(rows[rows @ v < -slow])
+
+
+def _misfits(run: Run) -> Iterator[float]:
+    log, e = run.impacts, run.scene_resolved["contact"]["restitution"]
+    for step, before, after, share in zip(log.step, log.v_minus, log.v_plus, log.scale, strict=True):
+        rows = colliding_rows(run, step, before)
+        off, approach = rows @ (after + (share * (1.0 + e) - 1.0) * before), rows @ before
+        yield float(np.max(np.abs(off)) / np.max(np.abs(approach))) if len(rows) else 0.0
 
 
 def settled_at(trace: Trace, factor: float = 1.0) -> int:
@@ -116,13 +136,10 @@ def root_mean_square(trace: Trace, ideal: Trace, window: slice) -> Floats:
     return np.sqrt(np.mean((trace.device[window] - ideal.device[window]) ** 2, axis=0))
 
 
-def force_distance(trace: Trace, ideal: Trace, window: slice, order: int) -> Floats:
-    """Return the mean (order 1) or RMS (order 2) distance between the forces of the actuators, per coordinate.
-
-    An impulse p is the force p/Δt over one step. As the step shrinks, the mean has a limit; the RMS has none.
-    """
-    apart = np.abs(trace.device_force - ideal.device_force)[window]
-    return np.asarray(np.mean(apart**order, axis=0) ** (1.0 / order))
+def force_distance(trace: Trace, ideal: Trace, window: slice, steps: int) -> Floats:
+    """Return the mean distance between the forces of the actuators, each averaged over the last `steps` steps (3,)."""
+    apart = np.vstack([np.zeros((steps - 1, 3)), trace.device_force - ideal.device_force])
+    return np.asarray(np.mean(np.abs(sliding_window_view(apart, steps, axis=0).mean(axis=-1))[window], axis=0))
 
 
 def peak_force(trace: Trace) -> Floats:
@@ -132,7 +149,7 @@ def peak_force(trace: Trace) -> Floats:
 
 def unbalanced_force(trace: Trace, window: slice) -> Floats:
     """Return the mean |F + F_hand| of the actuators in contact, outside steps with a collision (3,) [N, N m]; for x the
-    tool touches the right wall, for y the floor, for theta either."""
+    tool touches the right wall, for y the floor, for rotation either."""
     right, floor = (np.min(corner_gaps(trace.tool)[k::2], axis=0)[:-1] <= TOUCHING for k in (0, 1))
     counted = np.column_stack([right, floor, right | floor])
     counted[trace.impact_step] = False

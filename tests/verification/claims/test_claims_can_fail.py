@@ -5,6 +5,7 @@ import pytest
 
 from verification.claims import CLAIMS, algebraic, peg, socket, walls
 
+TOWARDS = {"part": peg.CLOSEST, "coordinate": "x", "PB": 0.05, "CBuc": 0.06}
 RENDERED = {"measure": "x", "ahead": 3e-5, "impacts limited": 0.5}
 TOGETHER = {"distance": 0.0, "angle": 1e-15, "impacts limited": 1.0}
 SETTLED = {"test": walls.WHEREVER, "impulses settle after": 0.2}
@@ -31,24 +32,25 @@ ROWS = [
     ("C10 C13", BEST | {"coordinate": "x"}, True),
     ("C10 C13", WORST | {"coordinate": "x"}, False),
     ("C10 C13", BEST | {"coordinate": "x", "IAPB": FAR - 2e-5}, None),
-    ("C10 C13", BEST | {"coordinate": "theta", "PB": 5e-3}, None),
+    ("C10 C13", BEST | {"coordinate": "rotation", "PB": 5e-3}, None),
     ("C10 C13", BEST | {"coordinate": peg.ALL_THREE}, True),
-    ("C11", BEST | {"part": peg.CLOSEST}, True),
-    ("C11", {"part": peg.CLOSEST, "IAPB": FAR, "PB": FAR, "CBuc": NEAR}, False),
+    ("C11", TOWARDS | {"IAPB": 0.01}, True),
+    ("C11", TOWARDS | {"IAPB": 0.09}, False),
+    ("C11", TOWARDS | {"IAPB": 0.047}, None),
     ("C11", {"part": peg.LARGE, "IAPB": 5.0, "PB": 8.0, "CBuc": 8.0}, False),
     ("C11", {"part": peg.BALANCE, "IAPB": 0.1, "PB": 0.02, "CBuc": 0.5}, False),
     ("C11", {"part": peg.BALANCE, "IAPB": 0.01, "PB": 0.02, "CBuc": 0.0}, True),
     ("C11", {"part": peg.BALANCE, "IAPB": 1e-18, "PB": 1e-19, "CBuc": 0.0}, None),
     ("C12", RENDERED, True),
     ("C12", RENDERED | {"ahead": -3e-5}, False),
-    ("C12", RENDERED | {"measure": "theta"}, None),
+    ("C12", RENDERED | {"measure": "rotation"}, None),
     ("C12", RENDERED | {"measure": peg.SETTLING, "ahead": 0.0}, None),
     ("C12", RENDERED | {"impacts limited": 0.0}, None),
     ("C13", {"coordinate": peg.PENETRATION, "IAPB": NEAR, "PB": FAR}, True),
     ("C13", {"coordinate": peg.PENETRATION, "IAPB": FAR, "PB": NEAR}, False),
     ("C14", {"coordinate": "x", "IAPB": 15.0, "PB": 5.0}, True),
     ("C14", {"coordinate": "x", "IAPB": 4.0, "PB": 5.0}, False),
-    ("C14", {"coordinate": "theta", "IAPB": 1e-9, "PB": 0.0}, None),
+    ("C14", {"coordinate": "rotation", "IAPB": 1e-9, "PB": 0.0}, None),
     ("C14", {"coordinate": "x", "IAPB": 4.5, "PB": 4.5}, None),
     ("C15", AHEAD | {"part": peg.SETTLES, "ahead": 0.4}, True),
     ("C15", AHEAD | {"part": f"{peg.SETTLES}, {peg.LARGER}", "ahead": -0.4}, False),

@@ -84,6 +84,12 @@ def test_the_outcome_of_a_claim_follows_from_the_parts_that_the_paper_states(par
     assert added.outcome == (outcome if FAILS in outcome else "not computed")
 
 
+def test_what_no_case_tests_cannot_tell_whatever_is_shown_beside_it():
+    claim = replace(CLAIM, roles={"x": BEYOND}, untested=("whole steps",))
+    found = claim.conclude(claim.table_of([{"part": "x", "error": 2.0}] * 20))
+    assert (found.outcome, [part.name for part in found.parts]) == ("cannot tell", ["whole steps", "x"])
+
+
 CLAIM = Check(key="C99", question="?", cases=lambda study: (), row=lambda study, case: case, parts=["part"],
               conditions=["tilt"], holds=lambda row: row["error"] < 1.0, says=lambda table: "Found.")  # fmt: skip
 
@@ -183,6 +189,11 @@ def test_too_few_fresh_trials_confirm_nothing(count):
 def test_without_fresh_trials_the_other_half_must_confirm():
     assert judge_part("x", trials(gentle, widths=(1.0,))).verdict == MIXED
     assert judge_part("x", trials(gentle)).verdict == WHERE
+
+
+def test_a_half_without_a_failure_hides_no_range():
+    sizes = table([{"tilt [rad]": float(n)} for n in range(1, 28)], ()).judged(lambda row: row["tilt"] > 2.0)
+    assert str(judge_part("x", sizes).region) == "tilt >= 4 rad"
 
 
 @pytest.mark.parametrize("share", [0.55, 0.75, 0.85])

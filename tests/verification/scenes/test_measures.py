@@ -19,7 +19,7 @@ def trace(device=None, velocity=None, force=None, contact_at=10, tool=None):
     return measures.Trace(
         np.arange(STEPS + 1) * DT, device, device if tool is None else tool, states if velocity is None else velocity,
         steps if force is None else force, steps + [-0.32, 0.4, 0.0], np.zeros(STEPS), new, np.array([contact_at]),
-        np.array([1e-3]), np.array([1.0]), np.zeros(STEPS + 1),
+        np.array([1e-3]), np.array([1.0]), np.zeros(1), np.zeros(STEPS + 1),
     )  # fmt: skip
 
 
@@ -53,12 +53,12 @@ def test_settling_counts_from_the_first_contact():
     assert measures.settling_times(trace(velocity=FOREVER)) == pytest.approx([0.9] * 3)
 
 
-def test_a_spike_one_step_later_counts_by_its_impulse_and_not_by_its_square():
-    early, late = column(np.eye(1, STEPS, 30)[0] * 60.0, 0), column(np.eye(1, STEPS, 31)[0] * 60.0, 0)
-    mean, rms = (measures.force_distance(trace(force=late), trace(force=early), slice(0, STEPS), order)[0]
-                 for order in (1, 2))
-    assert mean == pytest.approx(2 * 60.0 / STEPS) and rms == pytest.approx(60.0 * np.sqrt(2 / STEPS))
-    assert measures.peak_force(trace(force=late))[0] == 60.0
+def test_a_spike_one_step_later_hardly_counts_and_a_missing_one_counts_in_full():
+    early, late = (trace(force=column(np.eye(1, STEPS, step)[0] * 60.0, 0)) for step in (30, 31))
+    far, none, shifted = (measures.force_distance(late, other, slice(20, STEPS), steps)[0]
+                          for other, steps in ((early, 1), (trace(), 16), (early, 16)))
+    assert (far, none, shifted) == pytest.approx((2 * 60.0 / 80, 60.0 / 80, 2 * 60.0 / 16 / 80))
+    assert measures.peak_force(late)[0] == 60.0
 
 
 def test_balance_is_judged_in_contact_and_outside_collisions():
