@@ -161,9 +161,9 @@ def row_of(record: EngineRecord) -> Row:
 def told(rows: Sequence[Row]) -> tuple[str, str]:
     """Return what is asked of one engine at one choice of settings, and the result, from its rows."""
     first, missed = rows[0], ", ".join(f"{row['scene']} ({_worst(row)})" for row in rows if row["law"] != MET)
-    at = "with its own settings" if first["settings"] == OWN else f"with a step of {1e3 * MATCHED_STEP:g} ms"
+    at = "settings that suit it" if first["settings"] == OWN else f"a step of {1e3 * MATCHED_STEP:g} ms"
     rise = max(row["largest rise of energy"] or 0.0 for row in rows)
-    return (f"{first['engine']} {first['version']}, {at}: scenes with the known outcome",
+    return (f"{first['engine']} {first['version']} with {at}: scenes with the known outcome",
             f"{_met(rows)} of {len(rows)}{missed and f'; not in {missed}'}. Largest relative rise of energy: "
             f"{rise:.2g}")
 
@@ -219,7 +219,7 @@ def _misses(rows: Iterable[Row]) -> str:
     found: dict[str, list[str]] = {}
     for row in (row for row in rows if row["law"] != MET):
         found.setdefault(f"{row['scene']} ({_worst(row)})", []).append(
-            "with its own settings" if row["settings"] == OWN else f"at a step of {1e3 * MATCHED_STEP:g} ms")
+            "with settings that suit it" if row["settings"] == OWN else f"at a step of {1e3 * MATCHED_STEP:g} ms")
     return ", ".join(f"{what} {' and '.join(how)}" for what, how in found.items())
 
 
@@ -230,12 +230,14 @@ def _met(rows: Sequence[Row]) -> int:
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     present = sorted(_present(tables["errors"]), key=lambda row: (not _is_ours(row), row["engine"]))
     own, matched = ([row for row in present if row["settings"] == choice] for choice in SETTINGS)
+    others = ", ".join(dict.fromkeys(row["engine"] for row in present if not _is_ours(row))) or "no other engine"
+    own_count = len({row["engine"] for row in present if _is_ours(row)})
     said = "; ".join(f"{engine}, {missed}" for engine, rows in groupby(present, key=lambda row: row["engine"])
                         if (missed := _misses(rows)))  # fmt: skip
     return (
-        f"{len({row['engine'] for row in present})} engines simulate {len({row['scene'] for row in present})} scenes "
-        f"of known outcome. The outcome is right in {_met(own)} of {len(own)} runs with the engine's own settings and "
-        f"in {_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Wrong: {said}." if said else "")
+        f"{others} and {own_count} methods of ours simulate {len({row['scene'] for row in present})} scenes of known "
+        f"outcome. The outcome is right in {_met(own)} of {len(own)} runs with settings that suit the engine and in "
+        f"{_met(matched)} of {len(matched)} with a step of 1 ms." + (f" Wrong: {said}." if said else "")
     )
 
 
@@ -244,16 +246,18 @@ ERRORS = Check(
     cases=lambda study: product(SIMULATORS, FIXED_SCENES), row=_rows, says=_says, digits=2,
     note="The errors of energy, momentum and velocity are relative to the kinetic energy at the start, the sum of m "
     "|v| and the largest speed. In resting scenes the rise of energy is relative to m g times the bodies' size. "
-    "The outcome is right (“met”) if all errors are at most 1 % or, at rest, if nothing moves by more than 1 mm.",
+    "The outcome is right (“met”) if all errors are at most 1 % or, at rest, if nothing moves by more than 1 mm. "
+    "Drift: largest distance from the start; creep: movement in the second half.",
 )
 engines = Topic(
     key="engines", title="Other engines",
-    question="Every installed engine simulates eight frictionless scenes of known outcome (listed below): symmetry and "
-    "conservation of energy and momentum determine it, or nothing may move. Each scene runs twice: with the engine's "
-    "best settings (“own”), and with its best settings at a step of 1 ms (“matched”). The best are those with the "
-    "smallest error on a grid of settings (docs/engines.md). Our own engine and our ideal world run with their "
-    "defaults. One program computes energy, momentum and overlap from the positions and velocities of all engines. "
-    "MuJoCo and Drake have no coefficient of restitution; springs with suitable damping replace it.",
+    question="Every installed engine simulates eight frictionless scenes (listed below) whose outcome is known, from "
+    "symmetry and the conservation of energy and momentum, or because nothing must move. Each scene runs twice: with "
+    "settings that suit the engine at any step, the same for all impacts (“own”), and at a step of 1 ms, with the "
+    "settings of least error on a grid, for MuJoCo and Drake chosen for each scene (“matched”; docs/engines.md). So "
+    "the matched settings can have the smaller error. Our engine and our ideal world run with their defaults, a step "
+    "of 1 ms, so that both runs are the same. MuJoCo and Drake have no coefficient of restitution; damped springs "
+    "replace it. Overlap is shown, but does not decide the outcome.",
     checks=(ERRORS, Check(key="settings", question="With which settings did the engines run?",
                           cases=lambda study: SIMULATORS, row=_settings),
             Check(key="scenes", question="What must come out?", cases=lambda study: FIXED_SCENES,

@@ -34,7 +34,8 @@ class Pinocchio(Simulator):
         """
         damping = DAMPING if np.ptp(scene.masses) < MANY_TIMES_HEAVIER * scene.masses.min() else DAMPING_OF_A_STACK
         return Settings(step or STEP, {"inv_damping": damping, "contacts found by": "our detection"},
-                        "no contact detection, no stepping; approaching rows go to it as equalities")  # fmt: skip
+                        "computes only the impact; our code finds contacts and steps time, and passes the approaching "
+                        "contacts as equalities")  # fmt: skip
 
     def run(self, scene: FixedScene, settings: Settings, step: float, duration: float) -> Trajectory:
         """Simulate with semi-implicit steps; touching, approaching rows are resolved at once at the start of a step."""

@@ -168,7 +168,8 @@ FIXED_SCENES: dict[str, FixedScene] = {scene.name: scene for scene in (
                      enumerate([-2.0 * RADIUS - 0.0203, *(k * (2.0 * RADIUS + 0.0041) for k in range(4))])),
                (), 1.0, 0.2, 2.0 * RADIUS, final_velocities=(ORIGIN,) * 4 + ((1.0, 0.0, 0.0),)),
     # a ball strikes two touching balls at once (Bernoulli 1742); energy, momentum and symmetry give the result
-    FixedScene("bernoulli", "Bernoulli's three balls", "striker −1/5, the others 2√3/5 at 30°",
+    FixedScene("bernoulli", "Bernoulli's three balls", "the striker returns with 1/5 of its speed, the others leave "
+                                                       "with 2√3/5 of it at ±30°",
                (_ball("striker", 1.0, -sqrt(3.0) * RADIUS - 0.0203, 0.0, 1.0), _ball("upper", 1.0, 0.0, RADIUS, 0.0),
                 _ball("lower", 1.0, 0.0, -RADIUS, 0.0)), (), 1.0, 0.1, 2.0 * RADIUS,
                final_velocities=((-0.2, 0.0, 0.0), (0.6, _ACROSS, 0.0), (0.6, -_ACROSS, 0.0))),
@@ -189,7 +190,8 @@ FIXED_SCENES: dict[str, FixedScene] = {scene.name: scene for scene in (
                (_box("cube", 1.0, sqrt(2.0) * (0.5 * SIDE + _CLEAR), turn=_about_y(pi / 4), fall=1.0),),
                (_slope("left", -1.0), _slope("right", 1.0)), 1.0, 0.05, SIDE, final_velocities=((0.0, 0.0, 1.0),)),
     # four stacked boxes, each with a hundred times the mass of the one below
-    FixedScene("heavy_stack", "Stack with mass ratio 10⁶", "it stays",
+    FixedScene("heavy_stack", "Stack with mass ratio 10⁶",
+               "it stays; boxes of 1 g, 100 g, 10 kg and 1000 kg, the heaviest on top",
                tuple(_box(f"box {k + 1}", mass, (k + 0.5) * SIDE) for k, mass in enumerate((1e-3, 0.1, 10.0, 1000.0))),
                (FLOOR,), 0.0, 1.0, SIDE, WEIGHT),
     FixedScene("resting_box", "Resting box", "it stays", (_box("box", 1.0, 0.5 * SIDE),), (FLOOR,), 0.0, 60.0, SIDE,

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 # The runs, by the name that the paper gives their curve, which is also its style; right: the name among the inputs.
 UNLIMITED = {"ideal": "corner/ideal", "IAPB": "corner/IAPB", "PB": "corner/PB", "CBuc": "corner/CBuc"}
-LIMITED = {**UNLIMITED, "IAPB": "corner/IAPB-spread"}
+LIMITED = {"ideal": "corner/ideal", "IAPB LM": "corner/IAPB-spread", "PB": "corner/PB", "CBuc": "corner/CBuc"}
 STRATEGIES = {
     "ideal": "corner/ideal", "pfull": "corner/IAPB", "psaturated": "corner/IAPB-saturate",
     "pscaled": "corner/IAPB-scale", "pspread": "corner/IAPB-spread",
@@ -67,11 +67,13 @@ def _recipe(number: int, runs: Mapping[str, str], forces: bool) -> Recipe:
         named = dict(zip(runs, given, strict=True))
         traces = {curve: measures.trace_of(run) for curve, run in named.items()}
         measured = {curve: _measured(trace, traces.get("ideal")) for curve, trace in traces.items()}
-        told: dict[str, Any] = {**measured, "tilt": DEGREES * next(iter(traces.values())).device[0, 2]}
+        told: dict[str, Any] = {**measured, "tilt": DEGREES * next(iter(traces.values())).device[0, 2],
+                                "damping": (given[0].scene_resolved["device"]["damping"] or [0.0])[0]}  # fmt: skip
         panels, shown, note = ((_forces(key, traces), _FORCES, _HELD) if forces else
                                (_trajectories(key, named, traces), _MOTION, _SETTLED))
         if forces and "ideal" in runs:
-            told["lone"] = _lone_pulse(named["IAPB"], traces)
+            told["lone"] = _lone_pulse(*next((named[curve], traces[curve]) for curve in named if "IAPB" in curve),
+                                       traces["ideal"])
         elif "ideal" in runs:
             shown, note = _DISTANCES | shown, _FROM_IDEAL + note
             told |= {name: ", ".join(sorted(measured.keys() - {"ideal"}, key=lambda curve: measured[curve][name]))
@@ -98,20 +100,20 @@ def _measured(trace: Trace, ideal: Trace | None) -> dict[str, Any]:
     }  # fmt: skip
     if ideal is not None:
         x, y, angle = measures.root_mean_square(trace, ideal, slice(None)).tolist()
-        past = np.hypot(*(trace.device[-1] - ideal.device[-1])[:2])
+        past = np.abs(trace.device[-1] - ideal.device[-1])
         found |= {"x": MILLI * x, "y": MILLI * y, "angle": DEGREES * angle, "distance": MILLI * np.hypot(x, y),
-                  "past": MILLI * past}  # fmt: skip
+                  "past x": MILLI * past[0], "past y": MILLI * past[1]}  # fmt: skip
     return found
 
 
-def _lone_pulse(run: Run, traces: Traces) -> dict[str, float]:
-    """Return the largest torque of IAPB [N m] in a step around which ideal has none, its time, and its strongest pull.
+def _lone_pulse(run: Run, trace: Trace, ideal: Trace) -> dict[str, float]:
+    """Return the largest torque of a run [N m] in a step around which ideal has none, its time, and its strongest pull.
 
     A pull is an impulse [N s] against the normal of its contact.
     """
     from scipy.ndimage import maximum_filter1d
 
-    ours, theirs = (np.abs(traces[name].device_force[:, 2]) for name in ("IAPB", "ideal"))
+    ours, theirs = (np.abs(each.device_force[:, 2]) for each in (trace, ideal))
     step = int(np.argmax(np.where(maximum_filter1d(theirs, _NEAR) < _SMALL * ours, ours, 0.0)))
     impulses = run.contacts.impulse[slice(*run.contacts.offsets[step : step + 2])]
     return {"torque": ours[step], "time": run.time[step], "pull": -impulses.min(initial=0.0)}

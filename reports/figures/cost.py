@@ -43,11 +43,11 @@ def which_method(numbers: Table) -> Drawn:
         words, look = "", (MUTED, 0.0)
         if row["method"] != "none":
             look = _LOOKS[row["method"]].color, _STRONG if row["largest error"] <= _EXACT else _WEAK
-            stopped = f"{row['work']}: " if row["work"][0].isdigit() else ""
-            share = "" if row["share solved"] > 99 else f", {row['share solved']:.0f} %"
-            words = f"{stopped}{power_of_error(row['largest error'])}{share}"
+            stopped = f"stopped after {row['work']}; " if row["work"][0].isdigit() else ""
+            share = "" if row["share solved"] > 99 else f", solves {0.09 * row['share solved']:.0f} of 9"
+            words = f"{stopped}error {power_of_error(row['largest error'])}{share}"
         elif row["nearest"]:
-            words = f"nearest: {row['nearest'].split(':')[-1].strip()}"
+            words = f"nearest: error {row['nearest'].split(':')[-1].strip()}"
         cells.setdefault(f"{_contacts(row)}, d = {row['coordinates']}", []).append(cell(row["method"], words, *look))
     told = "; ".join(f"{row['contacts']} contacts in {row['budget']:g} µs: {row['method']}" for row in found.records())
     budgets = [accuracy.short_time(1e-6 * budget) for budget in dict.fromkeys(found.column("budget"))]
@@ -90,7 +90,9 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
     panels = [Panel(plot.svg, alt.strip()), Panel(*_lost_on_hard_impacts(numbers), "hard impacts", wide=True)]
     faster = [str(row["contacts"]) for row in _times_of_daqp(numbers, accuracy.IAPB) if row["ratio"] < 1.0]
     return Drawn(panels, kernels, {**looks, called.name: called}, {
-        "families": said.strip(), "python": f"with {' and '.join(faster)} contacts" if faster else "at no size"})
+        "families": said.strip(), "python": f"With {' and '.join(faster)} contacts it is faster even than compiled "
+                                            "IAPB." if
+        faster else "Compiled IAPB is faster than DAQP from Python at every size."})  # fmt: skip
 
 
 def _times_of_daqp(numbers: Table, ours_by: str = accuracy.CALLED) -> Iterator[Row]:
@@ -107,10 +109,11 @@ def _times_of_daqp(numbers: Table, ours_by: str = accuracy.CALLED) -> Iterator[R
 def _lost_on(name: str, kernels: Table) -> str:
     """Say for which contact counts of one family IAPB clearly costs more, and by which factor at worst."""
     slower = [row for row in kernels.records() if costs_more(row) is False]
+    where = f"On the {name.split()[-1]}"
     if not slower:
-        return f"On {name} IAPB is never clearly slower. "
+        return f"{where} IAPB is never clearly slower. "
     worst = 1.0 / min(row["ratio"] for row in slower)
-    return f"On {name} IAPB is up to {worst:.2g} times slower, clearly at {len(slower)} of {len(kernels.rows)} sizes. "
+    return f"{where} IAPB is clearly slower at {len(slower)} of {len(kernels.rows)} sizes, up to {worst:.2g} times. "
 
 
 def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
@@ -128,7 +131,8 @@ def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
             lines.setdefault(_contacts({"contacts": c}), []).append(told)
     words = "; ".join(f"{size}: " + ", ".join(map("{}: {}".format, heads.values(), said))
                       for size, said in lines.items())  # fmt: skip
-    return grid(tuple(heads.values()), {size: [*map(cell, said)] for size, said in lines.items()}, "plain"), words
+    titles = tuple(f"{head}, relative to IAPB" for head in heads.values())
+    return grid(titles, {size: [*map(cell, said)] for size, said in lines.items()}, "plain"), words
 
 
 @recipe("impact-accuracy", "work_precision")
@@ -175,13 +179,12 @@ def _draw_front(plot: Plot, points: Iterable[tuple[float, float]]) -> None:
 
 
 _ENGINES = {method: replace(STYLES[method], filled=False) for method in motion.WORLDS if method in STYLES}
-_WORLDS = {motion.IMPULSES: STYLES["IAPB"], motion.STIFFENED: STYLES["PB, stiffened"],
+_WORLDS = {motion.IMPULSES: STYLES["IAPB, Euler"], motion.STIFFENED: STYLES["PB, stiffened"],
            IDEAL: STYLES["ideal, Python"], **_ENGINES}  # fmt: skip
-_NAMES = ("IAPB, Euler", "IAPB, midpoint", "IAPB, RK4", "PB, Euler", "PB, RK4", "PB, stiffened")
-_INTEGRATORS = {method: STYLES[name] for method, name in zip(motion.INTEGRATORS, _NAMES, strict=True)}
+_INTEGRATORS = {method: STYLES[name] for method, name in motion.SHORT.items()}
 _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
-_HEADINGS = ("called", "ten times the accuracy costs (scenes)", "smallest error", "best for its time (grey), errors",
-             "energy made")
+_HEADINGS = ("called", "a tenth of the error takes (scenes with a fit)", "smallest error, median of the scenes",
+             "best for its time (grey), at errors", "energy made, relative to the kinetic energy")
 _NEVER = "never worth its time here"
 _FAST = 100.0  # [ms per simulated second] ten times as fast as the motion
 _PALE = 0.45  # strength of marks that are not used
@@ -193,7 +196,9 @@ def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle], most: i
     found, worth = motion.curves(motions, tuple(looks)), motion.worth(motions, tuple(looks))
     told, table = [], dict[str, Sequence[Markup]]()
     for row in worth.records():
-        look, words = looks[row["method"]], _worth_said(row)
+        step = max((run["energy made"], run["step"]) for curve in found for run in curve.runs
+                   if curve.method == row["method"])[1]  # fmt: skip
+        look, words = looks[row["method"]], _worth_said(row, step)
         told.append(f"{look.name}: " + ", ".join(map("{}: {}".format, _HEADINGS, words)))
         table[Markup("{} {}").format(swatch(look), look.name)] = [
             cell(Markup("<b>{}</b>").format(said) if said == _NEVER else said) for said in words]
@@ -204,7 +209,7 @@ def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle], most: i
         lost = motions.only(outcome != "ok" for outcome in motions.column("outcome")).where(scene=scene)
         panels.append(Panel(_motions(f"{key}-{number}", here, lost, looks),
                             f"{scene}: error of position against computing time. {said}.",
-                            f"{scene}. Nearest {_nearest(here, looks)}"))
+                            f"{scene}. Smallest error {_nearest(here, looks)}"))
     return Drawn(panels, worth, {look.name: look for look in looks.values()} | {"best for its time": _FRONT})
 
 
@@ -218,23 +223,26 @@ def _nearest(here: Sequence[motion.Curve], looks: Mapping[str, LineStyle]) -> st
     runs = [(run["position"], run["time"], looks[curve.method].name)
             for curve in here for run in curve.runs if not motion.by_chance(run)]
     fast, best = min((run for run in runs if run[1] <= _FAST), default=None), min(runs)
-    at_once = f"within {_FAST:g} ms per second: {fast[2]}, {power_of_error(fast[0])}; " if fast and fast != best else ""
-    return f"{at_once}at any cost: {best[2]}, {power_of_error(best[0])}"
+    at_once = (f"with {_FAST:g} ms of computing per simulated second: {fast[2]}, {power_of_error(fast[0])}; "
+               if fast and fast != best else "")  # fmt: skip
+    return f"{at_once}with any time: {best[2]}, {power_of_error(best[0])}"
 
 
-def _worth_said(row: Row) -> tuple[str, ...]:
-    """Return a line of the table of main numbers, a text for each column."""
+def _worth_said(row: Row, step: float) -> tuple[str, ...]:
+    """Return a line of the table of main numbers, a text for each column; `step` [ms] made the most energy."""
     scenes = row["scenes"]
-    cost = "no step buys it: the error stays" if row["error stays"] == scenes else "too few runs for a fit"
+    cost = "no time step helps: the error does not fall" if row["error stays"] == scenes else "too few runs for a fit"
     if row["scenes fitted"]:
         typical, *ends = (motion.times(row[key]) for key in ("tenfold accuracy costs", "least cost", "largest cost"))
         span = f" ({' to '.join(ends)})" if row["scenes fitted"] > 1 else ""
-        cost = f"{typical} the time{span}, {row['scenes fitted']} of {scenes}"
-    best = f"undecided: {row['cut short']} of {scenes} cut short" if row["cut short"] else _NEVER
+        cost = f"{typical} the time{span}; {row['scenes fitted']} of {scenes}"
+    best = f"undecided: finer steps too slow in {row['cut short']} of {scenes} scenes" if row["cut short"] else _NEVER
     if row["best for its time"]:
         errors = dict.fromkeys(power_of_error(row[key]) for key in ("most exact there", "least exact there"))
         best = f"{row['best for its time']} of {scenes} scenes, {' to '.join(errors)}"
-    made = f"up to {100 * row['energy made']:.2g} %" if row["energy made"] > accuracy.NO_GAIN else "none"
+    made = "none"
+    if row["energy made"] > accuracy.NO_GAIN:
+        made = f"up to {100 * row['energy made']:.2g} %, at {step:g} ms"
     return row["called"], cost, power_of_error(row["least error"]), best, made
 
 

@@ -15,7 +15,7 @@ Row = Mapping[str, Any]
 
 ROUNDING = 1e-16  # smaller errors are drawn here
 _PANELS = (("energy error", "error of the energy"), ("momentum error", "error of the momentum"),
-           ("overlap / size", "deepest overlap, of the size"))  # fmt: skip
+           ("overlap / size", "deepest overlap / size of the body"))  # fmt: skip
 _OURS = {"iapb (ours)": STYLES["IAPB"], "ideal world (ours)": replace(STYLES["ideal"], marker="s")}
 
 

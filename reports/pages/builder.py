@@ -18,11 +18,11 @@ from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import Figure, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, is_number
-from reports.pages.first import NEXT, facts, made_from
+from reports.pages.first import LATER, NEXT, facts, made_from
 from reports.pages.formulas import formula, prose
 from reports.pages.records import Evidence, anchor, runs_by_user
 from reports.pages.sections import SECTIONS
-from reports.pages.terms import explained
+from reports.pages.terms import HEADINGS, explained
 from verification.claims.conditions import Condition
 from verification.claims.peg import ALL_THREE, NAMED
 from verification.finding import (
@@ -77,6 +77,7 @@ def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dic
     }  # fmt: skip
     first = environment.get_template("first.html.j2").render(
         shared, facts=facts(evidence), made_from=made_from(evidence), first_map=first_map(evidence.claims), next=NEXT,
+        later=LATER,
     )  # fmt: skip
     maps = {claim.key: map_of(claim) for claim in evidence.claims}
     layout = environment.get_template("section.html.j2")
@@ -133,13 +134,13 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
     grid = grid.only(part in parts for part in grid["part"])
     if not grid.rows:
         return None
-    counts = [f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
+    counts = [f"{sum(shown.decided)} of {len(shown.decided)} of them in {NAMED[part]}"
               for part in parts for shown in [grid.where(part=part)]]
     caption = (
         "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: with impulses (IAPB) the "
-        "hand's path is nearest to the path at a rigid wall (ideal). A cross: springs only (PB) or a rigid wall felt "
-        "through a spring (CBuc) is nearer. A ring: too close to tell, because the distances differ by less than the "
-        f"error of the ideal path. Of these starts, a part of those of C10, IAPB is closest in {', '.join(counts)}."
+        "hand's path is nearest to the path at a rigid wall (ideal). A cross: springs alone (PB) or a rigid wall felt "
+        "through a spring (CBuc) is nearer. A ring: the distances differ by less than the error of the ideal path. The "
+        f"map shows those starts of C10 that lie on a grid; IAPB is closest in {', '.join(counts)}."
     )
     return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
                          "part", words=NAMED)
@@ -168,7 +169,10 @@ def worst_first(cases: Iterable[Finding]) -> list[Finding]:
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
     failing, total = sum(part.verdict == REFUTED for part in topic.parts), len(topic.parts)
-    return f"{failing} of {total} findings fail" if failing and total > 1 else FINDINGS[topic.verdict]
+    if failing and total > 1:
+        return f"{failing} of {total} findings {'fails' if failing == 1 else 'fail'}"
+    missing = topic.key == "proofs" and any(part.optional for part in topic.parts)
+    return FINDINGS[topic.verdict] + ", as far as checked" * missing
 
 
 def judged(part: Part) -> str:
@@ -181,13 +185,18 @@ def counted(part: Part) -> str:
     """Return as text in how many of the decided trials a part holds, how many cannot tell, and its region's counts."""
     if not part.decided and not part.unknown:
         return ""
-    unknown = f", {part.unknown} cannot tell" if part.unknown else ""
+    unknown = f" ({part.unknown} more cannot tell)" if part.unknown else ""
     cases = f" ({part.cases} cases in these trials)" if part.cases else ""
-    region = part.region
-    share = f" ({region.share:.0%} of the tested range)" if region and region.share else ""
-    where = (f" over all conditions; range found from {region.searched} trials{share}, confirmed by "
-             f"{region.others + region.fresh} others") if region else ""  # fmt: skip
-    return f"{part.held} of {part.decided}{cases}{unknown}{where}"
+    if not (region := part.region):
+        return f"{part.held} of {part.decided}{cases}{unknown}"
+    share = f"; {region.share:.0%} of the tested range" if region.share else ""
+    return (f"(found in {region.searched} trials, confirmed in {region.others + region.fresh} others{share}); over all "
+            f"conditions {part.held} of {part.decided}{cases}{unknown}")  # fmt: skip
+
+
+def in_words(name: str) -> str:
+    """Return the name of a part with the rotation of the peg named as everywhere else."""
+    return re.sub(r"\btheta\b", NAMED["theta"], name)
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure]) -> tuple[tuple[str, Table], ...]:
@@ -204,8 +213,8 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        judged=judged, badge_words=badge_words, counted=counted, tables_without=tables_without,
-        runs_by_user=runs_by_user, anchor=anchor,
+        judged=judged, in_words=in_words, heading=lambda title: HEADINGS.get(title, title), badge_words=badge_words,
+        counted=counted, tables_without=tables_without, runs_by_user=runs_by_user, anchor=anchor,
         ranked=ranked, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals |= {"rows_shown": ROWS_SHOWN, "engine": ENGINE}

@@ -18,9 +18,10 @@ from verification.cost.steps import hardest
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
-    "The energy loss in equations (18) and (24) lacks a factor ½. The matrix in (37) is not the pseudo-inverse. "
-    "Impulses by (13) and (14) do not conserve momentum. The impulse (20), which gives the velocity (21), can add "
-    "energy by rounding if it is computed as printed."
+    "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv; equations (18) and (24) lack the ½. The matrix in (37) is not the "
+    "pseudo-inverse of W = J M⁻¹Jᵀ, but the conclusion (33) is true. Equations (13) and (14) give each of two touching "
+    "bodies an impulse of its own, so that momentum is not conserved. The impulse (20), which gives the velocity (21), "
+    "can add energy by rounding if it is computed as printed."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
@@ -30,12 +31,9 @@ COUNTED = dict(zip(KINDS, (
 ), strict=True))
 # Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
 GRAVEST = ("exact-energy", "hard-cases", "scene-ledger", "engines", "complementarity", "stability", "mechanics")
-NEXT = (
-    ("First, read for five minutes", "the idea, one formula", "idea"),
-    ("then choose a method", "by time and contacts", "accuracy"),
-    ("Test your own solver", "laws, counterexamples", "properties"),
-    ("All data", "runs, tables, commands", "manifest"),
-)
+NEXT = ("Read “The idea”: one formula, five minutes", "idea")  # the one next step
+LATER = (("which method for your time budget", "accuracy"), ("tests for your own solver", "properties"),
+         ("all data and commands", "manifest"))
 
 
 class Fact(NamedTuple):
@@ -64,8 +62,9 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     counts = [f"{count} {words}" for count, words in count_claims(evidence.claims).values()]
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
-    told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials decide these "
-                 f"verdicts, {unknown:,} others cannot tell.", "claims")] if claims else []  # fmt: skip
+    told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} tests decide these "
+                 f"verdicts; in {unknown:,} more the compared values differ by less than their error.", "claims")
+            ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
         if text := " ".join(said for held, said in found if held is wanted):
             told.append(Fact(label, text, "C11" if wanted else "C10", kind))
@@ -92,7 +91,7 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
     table, limits = (each.tables.get(each.key) if each else None for each in (claim, limited))
     if table is None or "part" not in table.keys:
         return
-    found = {"if the device can give any force": table.where(part=LARGE)}
+    found = {"with a device of unlimited force": table.where(part=LARGE)}
     if limits is not None and "force_limit" in limits.keys:
         found["on the paper's device, which gives at most 15 N"] = limits.where(force_limit=1.0)
     ratios = {device: [row["IAPB"] / row["PB"] for row in rows.records()
@@ -101,7 +100,8 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
             for device, each in ratios.items() if each]  # fmt: skip
     if said:
         yield all(median(each) > 1.0 for each in ratios.values() if each), (
-            f"With impulses instead of springs alone, the largest force on the hand is {', and '.join(said)}.")
+            "As the paper claims, impulses push the hand harder than springs alone: the largest force is "
+            f"{', and '.join(said)}.")
 
 
 def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
@@ -109,26 +109,29 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     parts = [part for part in claim.parts if not part.role and part.decided] if claim else []
     if claim is None or not parts:
         return
-    each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
+    each = ", ".join(f"in {part.held} of {part.decided} starts in {part.named or part.name}" for part in parts)
+    starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper shows one start, in a picture that is lost. Of all starts that we tested and that are not too close "
-        f"to call, impulses bring the hand's path nearest to the path at a rigid wall in {each}.")
+        f"In {starts} starts we compared impulses (IAPB), springs alone (PB) and a rigid wall felt through a spring "
+        "(CBuc) with the path of the hand at a rigid wall. Where they clearly differ, impulses come nearest to it "
+        f"{each}. The paper shows one start.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found = {name: closest_in(small)[name] for name in ("x", "y")}
-        each = " and ".join(f"{name} in {ahead} of {told}" for name, (ahead, told) in found.items())
+        each = " and ".join(f"in {name} in {ahead} of {told} starts" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the pushed body, a peg, starts tilted by at most {degrees(Condition().tilt):.2f}°, impulses bring the "
-            f"hand's path nearest to the path at a rigid wall: {each} starts in which the methods differ clearly.")
+            f"If the pushed body, a peg, starts tilted by at most {degrees(Condition().tilt):.2f}° "
+            f"({Condition().tilt:g} rad), the hand's path with impulses is the nearest to that at a rigid wall: {each} "
+            "(starts too close to call are left out).")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
     """Yield the time of a step against the budget of a loop and against MuJoCo, and where Lemke's method is faster."""
     if step := peg_step(evidence):
-        yield f"A step of the peg that moves into the corner takes {step}; a loop at 1 kHz allows 1000 µs."
+        yield f"A step of the peg in the corner takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
         ratios = sorted(float(row["ratio"]) for row in hardest(races))
-        yield (f"In {len(ratios)} scenes at rest, a step takes {ratios[0]:.2g} to {ratios[-1]:.2g} times as long as "
-               "one of the engine MuJoCo.")
+        yield (f"In {len(ratios)} scenes at rest or nearly so, our step takes {ratios[0]:.2g} to {ratios[-1]:.2g} of "
+               "the time of a MuJoCo step.")
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
         yield (f"Lemke's complementarity method is faster than our engine in {raced.holds.count(False)} of the "
                f"{len(raced.decided)} tested impacts whose times differ clearly.")
@@ -143,4 +146,5 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."
-    return Fact("Known failures", f"Not computed: {', '.join(lacking)}." if lacking else said, "asked", items=lines)
+    told = f"Not computed: {', '.join(lacking)}." if lacking else said
+    return Fact("Known failures and missed targets", told, "asked", items=lines)

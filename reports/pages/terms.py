@@ -16,6 +16,7 @@ from reports.pages.formulas import prose
 TERMS: dict[str, tuple[str, str]] = {
     r"worlds?": ("world", "a contact law together with a coupling between device and tool. The same scene is "
                  "simulated in several worlds, each with its name"),
+    r"engine": ("engine", "the simulator of this project, iapb; other engines are named"),
     r"IAPB": ("IAPB", "impulse-augmented penalties, the paper's method: an impulse at each new contact, then a spring "
               "and damper while the contact lasts. The world IAPB has this contact law and the four-channel coupling"),
     r"ideal|rigid world": ("ideal", "the world with rigid contacts, computed from a complementarity problem in every "
@@ -26,6 +27,8 @@ TERMS: dict[str, tuple[str, str]] = {
               "damper join device and tool, active only in contact"),
     r"(?:IAPB|ideal)[- ](?:with )?friction": ("IAPB-friction, ideal-friction",
                                               "the same worlds with Coulomb friction in their impacts or constraints"),
+    r"PB, stiffened": ("PB, stiffened", "PB with walls as stiff as the time step permits; other PB has the paper's "
+                       "1000 N/m"),
     r"IAPB-push": ("IAPB-push", "the world IAPB with impulses that only push, found from two complementarity "
                    "problems"),
     r"IAPB LM": ("IAPB LM", "IAPB with each impulse spread over several steps, to stay within the device's limits"),
@@ -60,8 +63,9 @@ TERMS: dict[str, tuple[str, str]] = {
                      "never exceeds that at the start plus the work done on it"),
     r"factored": ("factored", "the engine's method for one impact: it factors M and projects the velocity with an "
                   "orthonormal basis of the rows"),
-    r"no clamp": ("clamp", "the last operation of an impact, which corrects the velocity by a few units in the last "
-                  "place so that rounding cannot add energy"),
+    r"(?:no|without|the) clamp": ("clamp", "the last operation of an impact: the smallest correction of the velocity "
+                                  "after which rounding has added no energy; if there is none, the change of velocity "
+                                  "is shortened"),
     r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, the velocity "
                                                    "by the impulse (20), in numpy"),
     r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "
@@ -75,10 +79,13 @@ TERMS: dict[str, tuple[str, str]] = {
     r"NCP|CCP": ("NCP, CCP", "complementarity problems with Coulomb's friction cone: the law itself, and its convex "
                  "relaxation"),
     r"Delassus|W": ("Delassus matrix W", "J M⁻¹ Jᵀ, the inverse mass that the contacts feel"),
-    r"trials?": ("trial", "one tested condition of a claim: the claim holds there, fails, or cannot be decided "
+    r"trials?": ("trial", "one tested condition of a claim: the claim holds there, fails, or the trial cannot tell "
                   "(the values differ by less than their error)"),
-    r"coherence|clustering": ("coherence, clustering", "the paper's two filters. Coherence: a contact that moved less "
-                              "than the coherence distance in a step is old. Clustering: near contacts merge"),
+    r"coherence|clustering|filters?": ("coherence, clustering", "the paper's two filters against false collisions. "
+                                       "Coherence: a contact that moved less than the coherence distance in a step is "
+                                       "the same contact and gets no impulse. Clustering: near contacts merge"),
+    r"facet jump|reach": ("facet jump, reach", "facet jump: the distance between a ball's contacts with two "
+                          "neighbouring facets; reach: the coherence distance"),
     r"[Ss]aturat\w+": ("saturated, scaled, spread", "impulses beyond the device's limits: each component cut at "
                       "its limit, all multiplied by one factor, or the rest given in later steps"),
     r"energy exchanged": ("energy exchanged", "the largest of kinetic energy, range of potential energy, and work of "
@@ -91,6 +98,30 @@ TERMS: dict[str, tuple[str, str]] = {
     r"planted": ("planted fault", "an error put into the code on purpose, to show that the check finds it"),
     r"peg": ("peg", "the paper's example: a rectangular body, moved by the hand in a plane, that meets a corner or a "
              "hole"),
+}  # fmt: skip
+# Heading of a column in the tables of numbers -> what is printed instead, where the key alone does not say enough.
+HEADINGS: dict[str, str] = {
+    "most contacts that agree": "largest pile that agrees [contacts]", "share that agrees": "share of piles that agree",
+    "negative share of p": "pulling impulses / sum of |p|",
+    "median distance from the LCP": "median distance of (21) from the LCP",
+    "pushing from the LCP": "largest distance of pushing impulses from the LCP",
+    "contradicted by least squares": "piles where least squares contradicts “agrees”",
+    "largest change of KE": "largest (KE⁺ − KE⁻)/KE⁻",
+    "smallest fault seen": "smallest error detected",
+    "M Δv − impulse": "error of M Δv = impulse", "Jᵀp − impulse": "error of Jᵀp = impulse",
+    "restitution": "error of restitution", "decades": "log₁₀ of the ratio", "ratio": "ratio of times",
+    "leak / energy exchanged": "leak / twice the dissipation of a damper KT/2 + |B|",
+    "with the coordination's gains [N s/m]": "KT/2 + |B| of wall and coupling together [N s/m]",
+    "needed / bound": "damping needed / KT/2 + |B|", "drift [m]": "largest distance from the start [m]",
+    "creep [m]": "movement in the second half [m]", "position": "position error [body lengths]",
+    "energy": "energy error", "signed energy": "energy error, simulated − true",
+    "tenfold accuracy costs": "factor in time for 10× smaller error", "error stays": "scenes where the error does not "
+    "fall",
+    "least error": "smallest error (median of scenes)", "scenes fitted": "scenes with a fit",
+    "most exact there": "smallest error at which it is best", "least exact there": "largest error at which it is best",
+    "cut short [scenes]": "scenes with finer steps too slow", "passive up to [N s/m]": "largest passive damping B [N "
+    "s/m]",
+    "there": "exponent there",
 }  # fmt: skip
 PLACE = "<!-- terms -->"
 _NOT_READ = re.compile(r"<(script|style|nav|head)\b.*?</\1>|<[^>]*>", re.DOTALL)

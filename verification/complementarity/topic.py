@@ -54,10 +54,11 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     cases = sum(found["cases"]) or 1
     agree = sum(row["share that agrees"] * row["cases"] for row in found.records()) / cases
     held, fail = (sum(part.verdict == verdict for part in parts) for verdict in (REPRODUCED, REFUTED))
-    return (f"IAPB and the LCP with Newton's law of restitution give the same velocity in {agree:.0%} of {cases} "
-            f"impacts. They agree if and only if pushing impulses (p >= 0) can produce IAPB's velocity: "
+    return (f"IAPB and the LCP with Newton's law of restitution give the same velocity in {agree:.0%} of {cases:,} "
+            "impacts (random ones of several geometries and those of our scenes; the share depends on this choice). "
+            f"They agree if and only if pushing impulses (p >= 0) can produce IAPB's velocity: "
             f"{sum(found['contradictions']) or 'no'} exceptions were found. Of the {len(parts)} findings on the page, "
-            f"{held} hold in full and {fail} fail.")
+            f"{held} hold in full, {len(parts) - held - fail} in part, and {fail} {'fails' if fail == 1 else 'fail'}.")
 
 
 REFERENCES = Check(

@@ -316,8 +316,9 @@ def choices(measured: Table) -> Table:
             row["nearest"] = f"{best.method}, {best.work}: {best.largest:.1g}"
         rows.append(row)
     return table_from(rows, digits=2, timed=CHOSEN[3:], note=(
-        f"Compiled methods; the last column is for calls from Python. None: nothing solves half of the nine impacts to "
-        f"{SOLVED:g} in time; then the nearest method, and its largest error."))  # fmt: skip
+        f"The best compiled method; the last column is the best of those called from Python. None: no method solves "
+        f"half of the nine impacts to {SOLVED:g} in time; then “nearest” is the best that ends in time, with its "
+        "largest error."))  # fmt: skip
 
 
 def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:
@@ -375,7 +376,7 @@ def _budgets_say(table: Table) -> Part:
     half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
     return target(
         "An impact that stops early, after a budget of rows (energy computed exactly)",
-        f"adds energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows already take "
+        f"adds energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows take "
         f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "never adds energy",
         gains == 0, timed=False)  # fmt: skip
 

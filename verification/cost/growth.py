@@ -93,7 +93,8 @@ def fitted(table: Table, method: str, axis: str) -> Row:
 def _growth_says(table: Table) -> Part:
     [ours] = table.where(method=FACTORED, axis="contacts").records()
     return limited("the time of the factored impact grows as the number of contacts to the power", ours["exponent"],
-                   LARGEST_EXPONENT, "", " over all sizes ({steepest from:g} to {to:g}: {there:.2f})".format_map(ours))
+                   LARGEST_EXPONENT, " over all sizes",
+                   " (steepest from {steepest from:g} to {to:g} contacts: {there:.2f})".format_map(ours))
 
 
 SCALING = Check(

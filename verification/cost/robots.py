@@ -54,6 +54,9 @@ def _for_each(call: Callable[..., object], given: Sequence[tuple[object, ...]]) 
         call(*arguments)
 
 
+_WORDS = {"mass matrix": "mass matrix", "bias": "bias force (Coriolis and centrifugal)"}
+
+
 def _robots_say(table: Table) -> Iterator[Part]:
     for form, limit in LIMITS.items():
         rows = table.where(form=form).records() if table.rows else []
@@ -61,13 +64,13 @@ def _robots_say(table: Table) -> Iterator[Part]:
             yield Part(f"Mass matrix and bias compared with Pinocchio, {form}: not timed.", NOT_COMPUTED, timed=True)
             continue
         worst = max(rows, key=lambda row: float(row["ratio"]))
-        yield limited(f"the {worst['quantity']} of {worst['robot']}, {form}, takes", worst["ratio"], limit,
-                      " times as long as Pinocchio's",
-                      f", the largest ratio of {len({row['robot'] for row in rows})} {table.note}")
+        count = len({row["robot"] for row in rows})
+        yield limited(f"the {_WORDS[worst['quantity']]} of the robot {worst['robot']}, {form}, takes", worst["ratio"],
+                      limit, " times as long as Pinocchio's", f" (the largest ratio of {count} {table.note})")
 
 
 ROBOTS = Check(
     key="robots", question="How long do M and B take, compared with Pinocchio?", cases=lambda _: FILES, row=time_robot,
     says=_robots_say, timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"), digits=3,
-    note="robots of other projects" if OTHERS else "robots of this project",
+    note="test robots of other projects" if OTHERS else "test robots of this project",
 )  # fmt: skip

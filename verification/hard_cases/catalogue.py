@@ -52,7 +52,7 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     "no_contact": partial(numerical.contacts, 0, "No contact at all",
                           "empty matrices, which libraries treat differently", "nothing happens, and no error"),
     "one_contact": partial(numerical.contacts, 1, "One contact", "it is easy: every method must solve it",
-                           "the velocity of equation (19), up to rounding"),
+                           "the textbook velocity (19), v⁺ = v⁻ − (1 + e) M⁻¹Jᵀ (J M⁻¹Jᵀ)⁻¹ J v⁻, up to rounding"),
     "hundred_contacts": partial(numerical.contacts, 100, "100 contacts of rank three",
                                 "97 redundant rows, each exact in doubles",
                                 "exact rank, and the velocity that three contacts give"),
@@ -78,10 +78,11 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
                                  "in no world does the wall give energy"),
     "wall_beyond_the_bound": partial(
         motions.wall, 500, "a penalty wall throws the tool back faster than it arrived",
-        "an impulse stops the tool before the spring is compressed: the wall gives no energy"),
+        "the wall gives no energy: with an impulse, the spring gives back less than the impulse has taken"),
     "wall_far_beyond_the_bound": partial(
         motions.wall, 2000, "only the spring acts while the contact lasts, and one time step is as long as a bounce",
-        "the wall gives no energy. IAPB and PB should fail, because both use this stiff spring"),
+        "an ideal wall gives no energy. We expect IAPB and PB to fail, because the spring gives back more than an "
+        "impulse has taken"),
     **_named(motions.wedged_peg_motion),
     "touching_cradle": partial(motions.cradle, 0.0, "touching exactly"),
     "touching_cradle_in_centimetres": partial(motions.cradle, 0.0, "touching but for rounding", 0.01),
@@ -89,9 +90,11 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     "cradle_a_micrometre_sunk": partial(motions.cradle, -1e-6, "sunk by a micrometre"),
     **_named(friction.double_pendulum_motion),
     "sticking_threshold": partial(friction.pushed, 0.99, "Sticking, 1 % below the threshold",
-                                  "it sticks; with the paper's law (6), viscous below v_threshold, it would creep"),
+                                  "it sticks. All worlds have Coulomb's law here; with the paper's law (6), which is "
+                                  "viscous below 1 mm/s, it would creep"),
     "sliding_threshold": partial(friction.pushed, 1.01, "Sliding, 1 % above the threshold",
-                                 "it slides by ½ 0.01 μ g t²; with law (6) it would be nearly v_threshold t ahead"),
+                                 "it slides by ½ 0.01 μ g t². All worlds have Coulomb's law here; with the paper's law "
+                                 "(6), which is viscous below 1 mm/s, it would be nearly t × 1 mm/s ahead"),
     **_named(friction.creep_of_the_regularised_law, friction.painleve_rod, friction.stick_slip, sticking.nudged_box),
     "box_on_a_slope": partial(sticking.on_a_slope, "Box that sticks on a slope", "box_on_a_slope", 1, sticking.BOX),
     "stack_on_a_slope": partial(sticking.on_a_slope, "Stack that sticks on a slope", "stack_on_a_slope", 3,

@@ -25,17 +25,18 @@ from verification.table import Table
 
 ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
 _NOTES = {
-    "impact": "Stable: gain at most 10 d ε √κ(M), restitution residual at most 1e-8, error at most the error allowed. "
-              "The gain (KE⁺ − KE⁻)/KE⁻ is computed exactly. The error is |v⁺ − truth| / |v⁻| in the kinetic metric; "
-              "allowed is 10 n ε √κ (√κ + κ(A)), n the larger of c rows and d coordinates, κ that of M scaled to a "
-              "unit diagonal, A = J L⁻ᵀ with M = L Lᵀ. Smallest fault seen: the smallest relative error that, planted "
-              "in the impulse or velocity, makes a stable answer fail. Time: median of a call.",
-    "motion": "Stable: no energy created, restitution residual at most 1e-8, error within the discretisation error of "
-              "the step. Gain: the largest amount of energy created, relative to the kinetic energy at the start plus "
-              "the work of hand and gravity. Error: distance from the exact law, relative to its answer. Restitution "
-              "residual: that of the collisions, weighted by their impulses. Smallest fault seen: the smallest share "
-              "by which changes of place and velocity must be altered to make a stable motion fail. Time: median of a "
-              "step.",
+    "impact": "Stable: gain and error at most those allowed, restitution residual at most 1e-8. Gain: (KE⁺ − KE⁻)/KE⁻, "
+              "computed exactly. Error: |v⁺ − truth| / |v⁻| in the kinetic metric; allowed is what rounding may cause "
+              "with a backward stable method, 10 n ε √κ_M (√κ_M + κ_A): n is the larger of c rows and d coordinates, "
+              "κ_M the condition number of M scaled to a unit diagonal, κ_A that of A = J L⁻ᵀ with M = L Lᵀ. Smallest "
+              "error detected: relative, planted in the impulse or velocity of a stable answer. Time: median of a "
+              "call.",
+    "motion": "Stable: gain and error at most those allowed (what rounding or the time step may cause), restitution "
+              "residual at most 1e-8. Gain: the largest amount of energy created, relative to the kinetic energy at "
+              "the start plus the work of hand and gravity. Error: distance from the exact law, relative to its "
+              "answer. Restitution residual: the largest of all collisions; in a collision of several contacts, their "
+              "mean, weighted by the impulses. Smallest error detected: relative, planted in the displacements and "
+              "changes of velocity of a stable motion. Time: median of a step.",
 }  # fmt: skip
 
 
@@ -56,8 +57,8 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     failing = [f"{name}” ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
     skipped = len(cases) - len(tried)
     stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
-    sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer and adds no energy."
-                + (f" It fails in “{'; “'.join(failing)}." if failing else "")
+    sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer, and gains no more energy "
+                "than rounding or the time step allow." + (f" It fails in “{'; “'.join(failing)}." if failing else "")
                 + (f" {skipped} cases were skipped because their files are absent." if skipped else ""))  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
     question = "Is the engine stable on problems on which other methods fail?"

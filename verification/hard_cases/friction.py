@@ -120,9 +120,10 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
 
     return TrajectoryCase(
         "Creep of the regularised law, 1 % below the threshold", "(6) of the paper",
-        "the printed law never sticks: the block must creep at the speed that the law gives, no faster",
-        "0.99 v_threshold after a few steps",
-        "(6) for one coordinate, step by step", _block(0.99, "regularised"), measure, ("IAPB", "PB"),
+        "the paper's law (6) never sticks: the block must creep at the speed that the law gives, no faster",
+        "it creeps at 0.99 times 1 mm/s, the speed below which (6) is viscous, after a few steps",
+        "equation (6) of the paper for one coordinate, step by step", _block(0.99, "regularised"), measure,
+        ("IAPB", "PB"),
     )  # fmt: skip
 
 
@@ -253,10 +254,11 @@ def stick_slip() -> TrajectoryCase:
     return TrajectoryCase(
         "Stick-slip oscillator and its limit cycle",
         "Den Hartog, Trans. ASME 53 (1931); the textbooks' block on a belt",
-        "each cycle ends in a stick of zero length, at zero speed and at the very edge of the friction cone",
-        "one slip, one stick, then for ever the same cycle of 2π/ω",
+        "in the limit cycle the plate is at rest for only an instant of each period, with the friction force exactly "
+        "at its limit μ m g",
+        "the plate slides, sticks once, and then repeats the limit cycle, of period 2π/ω, for ever",
         "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "
-        "v = V (1 − cos ωt), for every start",
+        "v = V (1 − cos ωt), with V the speed of the spring's other end and ω the frequency of the plate on the spring",
         on_floor("stick_slip", "A plate pushed by a spring", [plate, presses], contact, rate=4000, duration=_PRESSED),
         measure, ("IAPB", "PB"),
     )  # fmt: skip

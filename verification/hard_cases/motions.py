@@ -77,8 +77,8 @@ def wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
 
     return TrajectoryCase(
         name, "Colgate and Schenkel, J. Robotic Systems 14 (1997); scenes/wall_1d.yaml", why_hard, expected,
-        "Colgate and Schenkel's theorem promises passivity up to the bound; beyond it, created energy is measured. The "
-        "motion is that of the sampled wall, tool and device, written out for one coordinate",
+        "up to the bound, Colgate and Schenkel's theorem guarantees passivity; beyond it, we measure the energy that "
+        "is created. The reference motion is the recursion of tool, device and sampled wall in one coordinate",
         load_scene(find_scene("wall_1d")).with_values(values), measure,
     )  # fmt: skip
 
@@ -120,7 +120,8 @@ def wedged_peg_motion() -> TrajectoryCase:
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
         "six gaps close in the same step; then the springs of six contacts carry the hand force",
         "at rest at the end of the hole, no deeper than six springs allow",
-        "statics: 2 K δ + 4 K s² δ = F, with depth δ, hand force F and s the sine of the sides' angle; rigid: δ = 0",
+        "statics: 2 K δ + 4 K s² δ = F, with depth δ, hand force F, stiffness K of a contact, and s the sine of the "
+        "angle between the sides and the motion; rigid: δ = 0",
         load_scene(find_scene("peg_hole")), _measure_peg,
     )  # fmt: skip
 
@@ -164,7 +165,7 @@ def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
         return Measured(largest_gain(run), NO_GAIN + 1.1 * stored, off, _BY_SPRINGS)
 
     return TrajectoryCase(
-        f"Newton's cradle, {words}", "textbook; paper (12) for the rows",
+        f"Newton's cradle, {words}", "textbook; the paper's rows (12)",
         "new contacts transmit momentum by impulses, lasting ones by springs; rounding may decide which are new",
         "momentum is conserved and no energy created, whichever ball leaves",
         "momentum and energy of five equal elastic balls: Σ v = 1 and Σ v² = 1",

@@ -37,7 +37,7 @@ def printed_formula_gains() -> HardCase:
     rows = np.vstack([base, base + 1e-4 * rng.normal(size=(2, d)), base + 1e-4 * rng.normal(size=(2, d))])
     return HardCase(
         "Rows 1e-4 apart on κ(M) = 1e6, elastic",
-        "erratum 6 (docs/theory.md); normal equations: Higham, Accuracy and Stability (2002)",
+        "number 6 of our errata of the paper (docs/theory.md); normal equations: Higham, Accuracy and Stability (2002)",
         "κ(W) is 1e8 from the rows times 1e6 from M: its small singular values are noise",
         "no energy is gained; the printed formula inverts noise",
         mass, rows, rng.normal(size=d), 1.0,
@@ -84,6 +84,6 @@ def light_direction() -> HardCase:
         "Velocity along M's lightest direction, κ(M) = 1e12",
         "backward error of Cholesky's factor: Higham, Accuracy and Stability (2002), chapter 10",
         "Cholesky's backward error d ε κ(M) is as large as the energy's fifth digit",
-        "no gain above 10 d ε √κ(M), thanks to the clamp",
+        "no gain with the clamp; for other methods up to 10 d ε √κ(M) is allowed",
         mass, rows, axes[:, -1], 1.0,
     )  # fmt: skip

@@ -23,9 +23,10 @@ def _answer(tables: Mapping[str, Table], _: Sequence[Part]) -> str:
     worst, balls = max(tables[AGAINST_PINOCCHIO.key]["worst"], default=0.0), tables[LINKED_IMPACTS.key]
     lost = min(balls.where(treatment=PER_BODY)["momentum change"])
     return (f"Mass matrices, forces and Jacobians differ from Pinocchio's by at most {worst:.1e} of the largest "
-            "entry. With (13)-(14), a row for each of two touching bodies, impacts of balls change the total momentum "
-            f"by at least {lost:.2g} times its value. On facets, the filters remove a ball's false collisions only if "
-            "the coherence distance reaches the next facet and the ball never bounces.")
+            "entry. With (13)-(14), an own impulse for each of two touching bodies, impacts of a ball on resting balls "
+            f"change the total momentum by at least {lost:.2g} times its value: the ball rebounds as from a wall. A "
+            "ball that rolls over flat facets gets false collisions unless the coherence distance is longer than the "
+            "way from one facet's contact to the next and the ball never leaves the surface.")
 
 
 mechanics = Topic(

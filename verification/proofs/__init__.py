@@ -16,6 +16,7 @@ from dataclasses import replace
 
 from verification.finding import (
     NOT_COMPUTED,
+    NOT_TESTABLE,
     REFUTED,
     REPRODUCED,
     Failure,
@@ -63,9 +64,9 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
          len(one.twins)) for one in records])  # fmt: skip
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
     confirmed = sum(one.sympy == YES for one in records)
-    sentence = (f"{proved} of {len(records)} statements are proved: a program checks the certificate of every step. "
-                f"SymPy confirms {'all ' * (confirmed == proved)}{confirmed}. Exact counterexamples refute "
-                f"{twins} statements that we altered to be wrong.")
+    sentence = (f"{proved} of {len(records)} statements about the formulas are proved: a program checks the "
+                f"certificate of every step. SymPy confirms {'all ' * (confirmed == proved)}{confirmed}. To test the "
+                f"program, we also wrote {twins} false variants; it refutes each by an exact counterexample.")
     parts = [Part(sentence, REPRODUCED if proved == len(records) else REFUTED)]
     tables = {"statements": table}
     if development:
@@ -80,11 +81,12 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
                 f"{len(development)} theorems about code: a checker of impacts in exact integers, and the last step of "
                 "the engine's impact in floating point. Axioms: those of the real numbers, and classical logic (of "
                 f"Flocq, the library for floating point). {ARGUED}" if asked or lost else
-                f"Coq is not installed: {len(development)} theorems about the code were not checked here.")  # fmt: skip
+                f"Another {len(development)} theorems, about the code, need Coq, which is not installed; they were not "
+                "checked here.")  # fmt: skip
         if lost:
             told = f"{told} Of {len(lost)} theorems Coq did not compile the file: {lost[0].error}"
-        if asked or lost:
-            whole = REPRODUCED if accepted == len(development) else NOT_COMPUTED
-            parts.append(Part(told, whole if accepted == len(asked) else REFUTED))
+        whole = REPRODUCED if accepted == len(development) else NOT_COMPUTED
+        parts.append(Part(told, whole if accepted == len(asked) else REFUTED) if asked or lost else
+                     Part(told, NOT_TESTABLE, optional=True))
         sentence = f"{sentence} {told}"
     return finding_of("proofs", "Proofs", "Which statements are proved?", sentence, tuple(parts), tables, failures)

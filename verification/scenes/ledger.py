@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene import scene_names
+from iapb.scene import find_scene, load_scene, scene_names
 from verification.check import Check, Study, Topic
 from verification.finding import MIXED, REFUTED, REPRODUCED, Part
 from verification.scenes.books import (
@@ -103,6 +103,10 @@ def _of_contacts(table: Table) -> Iterator[Part]:
                   REPRODUCED if complete == len(rows) else REFUTED)
 
 
+def _title(name: str) -> str:
+    return load_scene(find_scene(name)).title if name in scene_names() else name
+
+
 def _most(rows: Sequence[Row], key: str) -> Row:
     return max(rows, key=lambda row: float(row[key]))
 
@@ -125,8 +129,8 @@ def _of_books(table: Table) -> Part:
         f"holds in {len(rows) - len(made)} of {len(rows)} scenes"
         + (f". Elsewhere time stepping, not an impact, creates energy at some instant: {words} of the energy exchanged"
            if made else ""), "all scenes", MIXED if made else REPRODUCED,
-        miss=f"in {len(made)} of {len(rows)} scenes time stepping at some instant has created energy ({words})"
-             if made else "")
+        miss=f"in {len(made)} of {len(rows)} scenes the stored energy at some instant exceeds that at the start plus "
+             f"the work done, by an error of time stepping ({words} of the energy exchanged)" if made else "")
 
 
 def _of_residuals(table: Table) -> Iterator[Part]:
@@ -149,8 +153,8 @@ def _of_residuals(table: Table) -> Iterator[Part]:
         "Residual at the scene's own time step; the absolute values of motion and springs are added",
         f"larger in {len(wide)} of {len(rows)} scenes{said and ': ' + said}",
         f"at most {WORTH_NAMING:.0f} % of the energy exchanged", MIXED if wide else REPRODUCED,
-        miss=f"in the scene {wide[0]['scene']}, the energy balance misses {wide[0][OPEN]:.1f} % of the energy exchanged"
-             if wide else "")
+        miss=f"in the scene “{_title(wide[0]['scene'])}” the absolute energy errors of the time steps add up to "
+             f"{wide[0][OPEN]:.1f} % of the energy exchanged" if wide else "")
 
 
 def over_time(run: Run) -> Iterator[Row]:
@@ -201,10 +205,10 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     falls = sum(as_declared(row) for row in residuals)
     return (
         f"In {len(contacts)} scenes, {sum(row['dimensions'] == 3 for row in contacts)} of them three-dimensional, "
-        f"bodies overlap by at most {deepest['most penetration']:.2f} mm. The energy balance misses at most "
-        f"{widest[OPEN]:.1f} % of the energy exchanged ({widest['scene']}), gains and losses by time stepping added "
-        f"without their signs. In {falls} scenes this error is rounding, "
-        "or falls with the integrator's order as the step is shortened."
+        f"bodies overlap by at most {deepest['most penetration']:.2f} mm. The absolute energy errors of all time steps "
+        f"add up to at most {widest[OPEN]:.1f} % of the energy exchanged (“{_title(widest['scene'])}”). In {falls} of "
+        f"{len(residuals)} scenes this error is rounding, or shrinks with shorter steps as fast as the integrator's "
+        "order says."
     )
 
 

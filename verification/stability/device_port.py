@@ -190,10 +190,11 @@ def coupled(ports: Table) -> Part:
         case = row["the hand"], row["sensors"] == "ideal"
         most[case] = max(most.get(case, 0.0), row["needed / bound"])
     return Part.of(
-        "Damping that makes the device passive in CBuc, with the tool on a rigid wall, divided by Colgate's bound "
-        "KT/2 + |B|", f"{most[PRESSES, True]:.4f} with a pressing hand and ideal sensors, up to "
-        f"{most[PRESSES, False]:.3g} with late or coarse sensors. A hand that moves in and out of contact needs up to "
-        f"{most[CROSSES, True]:.3g}, because the coupler is already stretched when it switches on", "at most 1",
+        "CBuc at a rigid wall: the least device damping that makes it passive, as a multiple of Colgate's bound KT/2 + "
+        "|B| of the coupler", f"{most[PRESSES, True]:.4f} if the hand keeps pressing, with ideal sensors (late or "
+        f"coarse: up to {most[PRESSES, False]:.3g}). Up to {most[CROSSES, True]:.3g} (late or coarse: "
+        f"{most[CROSSES, False]:.3g}) if the hand moves in and out of contact, because the coupler is already "
+        "stretched when it switches on", "at most 1",
         MIXED if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
@@ -202,11 +203,12 @@ def coordinated(ports: Table) -> Part:
     found = ports.only(world != COUPLER_WORLD for world in ports["world"])
     needed, sums = found["damping needed"], found["with the coordination's gains"]
     return Part.of(
-        "Damping that makes the device passive with the four-channel controller, divided by the bound KT/2 + |B| of "
-        "the wall alone", f"up to {max(found['needed / bound']):.3g}: the device needs {min(needed):.3g} to "
-        f"{max(needed):.3g} N s/m, because the hand also feels the coupling's {COORDINATION[1]:g} N s/m. With the "
-        f"coupling's gains added to the bound, the ratio is up to {max(map(truediv, needed, sums)):.3g}. The bound "
-        "does not apply, because the tool moves", "at most 1", MIXED)
+        "Four-channel coupling at a wall of springs: the least device damping that makes it passive, as a multiple of "
+        "Colgate's bound for the wall alone", f"up to {max(found['needed / bound']):.3g}: the device needs "
+        f"{min(needed):.3g} to {max(needed):.3g} N s/m, because the hand also feels the coupling's "
+        f"{COORDINATION[1]:g} N s/m. As a multiple of the bound for wall and coupling together: up to "
+        f"{max(map(truediv, needed, sums)):.3g}", "at most 1, which is proved for a fixed wall; here the tool moves",
+        MIXED)
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:
@@ -223,8 +225,9 @@ PORT = Check(
     key="hand port", question="How much damping does the device need so that the hand draws no energy from the loop?",
     cases=lambda study: product(WALLS[study.depth], SENSORS, MOTIONS), row=_leak,
     says=lambda table: (coupled(table), coordinated(table)),
-    note="The complete device loop at 512 Hz. The hand moves to and fro by 0.5 mm; the worst of several speeds is "
-    "shown. In CBuc, stiffness and damping are those of the coupler. In the other worlds they are those of the wall, "
-    "and the coordination gains are those of Table I. Leak: energy that the hand draws from the loop at b = KT/2 + "
-    "|B|.",
+    note="The complete device loop at 512 Hz; the worst of several speeds of the hand. The hand moves by ±0.5 mm, so "
+    "that it always presses, or crosses the surface. Late: readings and forces each come one step late; coarse: "
+    "readings rounded to 10 µm. Stiffness and damping are those of the coupler in CBuc, else of the wall; the "
+    "four-channel coupling has the gains of the paper's Table I. Leak: energy that the hand draws from the loop at "
+    "b = KT/2 + |B|.",
 )

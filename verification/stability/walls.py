@@ -66,7 +66,7 @@ class Loop:
 class Contact:
     """Outcome at each wall; every array has the shape of the walls.
 
-    settled : whether the mass is still in the last quarter of the time and has not grown
+    settled : whether in the last quarter of the time the mass is still and never leaves the wall, and has not grown
     settling_time : time from the first contact to the last motion [s], infinite if the mass still moves at the end
     grown : whether the mass exceeds GROWN times its initial speed later than 1 s after the first contact at any wall
     bounces : number of times that the mass leaves the wall
@@ -143,12 +143,14 @@ def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> C
     first = np.where(inside.any(axis=0), inside.argmax(axis=0), steps - 1)
     moving = np.abs(speeds) > SETTLED_SPEED
     last_moving = np.where(moving.any(axis=0), steps - 1 - moving[::-1].argmax(axis=0), 0)
-    settled = last_moving < (1.0 - _LAST) * steps
+    left = inside[:-1] & ~inside[1:]
+    bouncing = left[round((1.0 - _LAST) * steps) :].any(axis=0)  # for ever, if slower than SETTLED_SPEED
+    settled = (last_moving < (1.0 - _LAST) * steps) & ~bouncing
     grown = (np.abs(speeds[time > time[first].min() + 1.0]) > GROWN * loop.speed).any(axis=0)
-    left = (inside[:-1] & ~inside[1:]).sum(axis=0)
     first_force = np.take_along_axis(forces, (forces > 0.0).argmax(axis=0)[None], axis=0)[0]
     return Contact(settled & ~grown, np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf), grown,
-                   left, positions.max(axis=0, initial=0.0), first_force / loop.step / loop.speed, forces.max(axis=0))
+                   left.sum(axis=0), positions.max(axis=0, initial=0.0), first_force / loop.step / loop.speed,
+                   forces.max(axis=0))  # fmt: skip
 
 
 def loops() -> tuple[Loop, ...]:

@@ -60,8 +60,10 @@ document.querySelectorAll("figure").forEach((figure) => {
   const [states, films] = ["[data-state]", "svg[data-duration]"].map((each) => [...figure.querySelectorAll(each)]);
   if (states.length) { // pictures, of which a slider shows one
     const { state: value } = states.find((state) => !state.hasAttribute("display")).dataset;
-    const slider = add(add(controlsOf(figure, "beforebegin"), "label", { textContent: "Tilt" }), "input",
-      { type: "range", min: 0, max: states.at(-1).dataset.state, value });
+    const tilts = states.flatMap((state) => state.textContent.match(/[\d.]+°/) ?? []);
+    const label = add(controlsOf(figure, "beforebegin"), "label", { textContent: `Tilt from ${tilts[0]} ` });
+    const slider = add(label, "input", { type: "range", min: 0, max: states.at(-1).dataset.state, value });
+    label.append(` to ${tilts.at(-1)}`);
     slider.addEventListener("input", () => states.forEach((state) => state.setAttribute("display", state.dataset.state === slider.value ? "inline" : "none")));
   }
   if (films.length) play(films, controlsOf(figure, "afterend"));

@@ -87,7 +87,7 @@ def test_the_answer_names_every_miss_ours_first():
     moved = replace(ours, measures={"drift [m]": 97.0, "creep [m]": 60.0}, scene="heavy_stack")
     other = replace(ours, engine="other", title="Another", measures={"drift [m]": 0.24}, choice="matched")
     _, answer = judged([other, moved])
-    assert answer.endswith("Wrong: iapb (ours), heavy stack (thrown out) with its own settings; "
+    assert answer.endswith("Wrong: iapb (ours), heavy stack (thrown out) with settings that suit it; "
                            "Another, redundant wedge (moves by 0.24 m) at a step of 1 ms.")
     assert (row_of(moved)["drift [m]"], row_of(moved)["creep [m]"], row_of(moved)["law"]) == (None, None, "missed")
     assert "Wrong" not in judged([ours])[1]

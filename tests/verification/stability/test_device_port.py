@@ -73,7 +73,8 @@ def leaks(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, object]]:
     found = []
     for world, sensors, kind, share in (
         ("CBuc", "ideal", study.PRESSES, 0.9), ("CBuc", "ideal", study.CROSSES, 2.0),
-        ("CBuc", "late", study.PRESSES, 4.0), ("PB", "ideal", study.PRESSES, 70.0 / COUPLED.bound),
+        ("CBuc", "late", study.PRESSES, 4.0), ("CBuc", "late", study.CROSSES, 5.0),
+        ("PB", "ideal", study.PRESSES, 70.0 / COUPLED.bound),
     ):
         monkeypatch.setattr(study, "needed_damping", lambda *_, b=share * COUPLED.bound: b)
         found.append(study.PORT.row(Study(), ((world, 1000.0, 0.0), sensors, kind)))
@@ -94,4 +95,11 @@ def test_a_pressing_hand_that_needs_more_than_the_bound_refutes_it(leaks) -> Non
     ((None, None, None, None), NOT_TESTABLE),
 ])
 def test_the_peg_rests_no_later_with_impulses(times, verdict) -> None:
-    assert peg(PEG.table_of({"settles after [s]": time, "bounces": 1} for time in times)).verdict == verdict
+    rests, bounces = peg(PEG.table_of({"settles after [s]": time, "bounces": 1} for time in times))
+    assert rests.verdict == verdict and bounces.verdict == REPRODUCED
+
+
+def test_more_bounces_with_impulses_are_a_finding_of_their_own() -> None:
+    rows = [{"settles after [s]": 1.0, "bounces": bounces} for bounces in (1, 2, 2, 2)]
+    rests, bounces = peg(PEG.table_of(rows))
+    assert rests.verdict == REPRODUCED and bounces.verdict == MIXED and "in 1 of 2 " in bounces.measured
