@@ -217,8 +217,12 @@ def _of_part(words: Mapping[str, str], name: str) -> str:
 def _spans(table: Table, keys: Iterable[str]) -> str:
     """Return the smallest and largest value of each column in words."""
     found = {key: [value for value in table[key] if value is not None] for key in keys}
-    return "".join(f" {key[:1].upper()}{key[1:]}: {min(values):.3g} to {max(values):.3g}."
+    return "".join(f" {key[:1].upper()}{key[1:]}: {_short(min(values))} to {_short(max(values))}."
                    for key, values in found.items() if values)  # fmt: skip
+
+
+def _short(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"
 
 
 @dataclass(frozen=True, kw_only=True)

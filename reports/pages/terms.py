@@ -101,7 +101,7 @@ TERMS: dict[str, tuple[str, str]] = {
 }  # fmt: skip
 # Heading of a column in the tables of numbers -> what is printed instead, where the key alone does not say enough.
 HEADINGS: dict[str, str] = {
-    "most contacts that agree": "largest pile that agrees [contacts]", "share that agrees": "share of piles that agree",
+    "most contacts that agree": "largest pile that agrees [contacts]",
     "negative share of p": "pulling impulses / sum of |p|",
     "median distance from the LCP": "median distance of (21) from the LCP",
     "pushing from the LCP": "largest distance of pushing impulses from the LCP",

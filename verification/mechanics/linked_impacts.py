@@ -138,7 +138,7 @@ def findings(table: Table) -> Iterator[Part]:
     yield Part.of(
         "The same balls with the paper's per-body rows (13)-(14)",
         f"energy changes by at most {energy:.1e}, but momentum always by at least {least:.2g} times its value, because "
-        "the striking ball rebounds as from a wall", "momentum changes, which is erratum 3",
+        "the striking ball rebounds as from a wall", "momentum changes (number 3 of our errata of the paper)",
         REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
     if five := table.where(problem="cradle of 5").records():
         yield _rows_decide(five)
@@ -150,7 +150,8 @@ def _rows_decide(five: Sequence[Row]) -> Part:
                "one after the other": (SEQUENTIAL, "one after the other along the row")}  # fmt: skip
     after = {name: np.array([row["v_x after"] for row in five if (row["treatment"], row["rows or order"]) == choice])
              for name, choice in choices.items()}  # fmt: skip
-    words = "; ".join(f"{name} ({', '.join(f'{v + 0.0:.1f}' for v in values)})" for name, values in after.items())
+    words = "; ".join(f"{name} ({', '.join(f'{round(v, 1) + 0.0:.1f}' for v in values)})"
+                      for name, values in after.items())
     apart = min(float(np.abs(a - b).max()) for a, b in combinations(after.values(), 2))
     return Part.of(
         "Conservation laws do not determine the outcome; the choice of contacts that enter the collision does",
