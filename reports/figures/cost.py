@@ -43,8 +43,8 @@ def which_method(numbers: Table) -> Drawn:
         words, look = "", (MUTED, 0.0)
         if row["method"] != "none":
             look = _LOOKS[row["method"]].color, _STRONG if row["largest error"] <= _EXACT else _WEAK
-            stopped = f"stopped after {row['work']}; " if row["work"][0].isdigit() else ""
-            share = "" if row["share solved"] > 99 else f", solves {0.09 * row['share solved']:.0f} of 9"
+            stopped = f"{row['work']}: " if row["work"][0].isdigit() else ""
+            share = "" if row["share solved"] > 99 else f", {0.09 * row['share solved']:.0f} of 9"
             words = f"{stopped}error {power_of_error(row['largest error'])}{share}"
         elif row["nearest"]:
             words = f"nearest: error {row['nearest'].split(':')[-1].strip()}"

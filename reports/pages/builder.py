@@ -134,13 +134,13 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
     grid = grid.only(part in parts for part in grid["part"])
     if not grid.rows:
         return None
-    counts = [f"{sum(shown.decided)} of {len(shown.decided)} of them in {NAMED[part]}"
+    counts = [f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
               for part in parts for shown in [grid.where(part=part)]]
     caption = (
         "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: with impulses (IAPB) the "
         "hand's path is nearest to the path at a rigid wall (ideal). A cross: springs alone (PB) or a rigid wall felt "
         "through a spring (CBuc) is nearer. A ring: the distances differ by less than the error of the ideal path. The "
-        f"map shows those starts of C10 that lie on a grid; IAPB is closest in {', '.join(counts)}."
+        f"map shows those starts of C10 that lie on a grid; of these, IAPB is closest in {', '.join(counts)}."
     )
     return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
                          "part", words=NAMED)

@@ -258,7 +258,7 @@ def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop():
              for contacts, pulls in ((10, 0.0), (40, 0.25))]  # fmt: skip
     topic = one("complementarity", tables={"piles": table_from(piles)})
     page = joined(Evidence(claims=(found,), topics=(topic,)))
-    assert "IAPB is closest in 24 of 84 of them in x" in page and 'id="where-c10"' in page
+    assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
     assert "but 14 is no safe limit" in page and f"up to rounding ({prose('3e-04')}" in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
