@@ -194,11 +194,6 @@ def counted(part: Part) -> str:
             f"conditions {part.held} of {part.decided}{cases}{unknown}")  # fmt: skip
 
 
-def in_words(name: str) -> str:
-    """Return the name of a part with the rotation of the peg named as everywhere else."""
-    return re.sub(r"\btheta\b", NAMED["theta"], name)
-
-
 def tables_without(topic: Finding, figures: Sequence[Figure]) -> tuple[tuple[str, Table], ...]:
     """Return the names and tables of a topic that are not drawn in a figure."""
     drawn = {name for figure in figures for name in figure.inputs}
@@ -213,7 +208,7 @@ def _environment() -> Environment:
     environment.filters.update(
         cell=format_cell, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        judged=judged, in_words=in_words, heading=lambda title: HEADINGS.get(title, title), badge_words=badge_words,
+        judged=judged, heading=lambda title: HEADINGS.get(title, title), badge_words=badge_words,
         counted=counted, tables_without=tables_without, runs_by_user=runs_by_user, anchor=anchor,
         ranked=ranked, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )

@@ -31,7 +31,7 @@ COUNTED = dict(zip(KINDS, (
 ), strict=True))
 # Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
 GRAVEST = ("exact-energy", "hard-cases", "scene-ledger", "engines", "complementarity", "stability", "mechanics")
-NEXT = ("Read “The idea”: one formula, five minutes", "idea")  # the one next step
+NEXT = ("Read “The idea”: one formula, five minutes", "idea")  # the one next step, at the top
 LATER = (("which method for your time budget", "accuracy"), ("tests for your own solver", "properties"),
          ("all data and commands", "manifest"))
 
@@ -63,7 +63,7 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
     told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} tests decide these "
-                 f"verdicts; in {unknown:,} more the compared values differ by less than their error.", "claims")
+                 f"verdicts; in {unknown:,} more the values differ by less than their error.", "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
         if text := " ".join(said for held, said in found if held is wanted):
@@ -72,7 +72,8 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
         told.append(Fact("Energy of impacts", f"{energy.answer} {LIMIT}", energy.key,
                          KINDS[0] if energy.verdict == REPRODUCED else KINDS[4]))  # fmt: skip
     if (rate := topics.get("haptic-rate")) is not None:
-        told.append(Fact("Is it fast?", " ".join((*_speed(evidence, rate), rate.answer)), rate.key))
+        met = rate.answer.partition(". ")[0].removesuffix(".") + "."  # the rest is in the table of topics
+        told.append(Fact("Is it fast?", " ".join((*_speed(evidence, rate), met)), rate.key))
     if any(topic.answer for topic in evidence.topics):
         told.append(_misses(evidence.topics))
     if claims:
@@ -93,14 +94,14 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
         return
     found = {"with a device of unlimited force": table.where(part=LARGE)}
     if limits is not None and "force_limit" in limits.keys:
-        found["on the paper's device, which gives at most 15 N"] = limits.where(force_limit=1.0)
+        found["on the paper's device, limited to 15 N"] = limits.where(force_limit=1.0)
     ratios = {device: [row["IAPB"] / row["PB"] for row in rows.records()
                        if row["coordinate"] != "rotation" and row["PB"]] for device, rows in found.items()}  # fmt: skip
     said = [f"{median(each):.2g} times as large {device} (median of {len(each)} cases)"
             for device, each in ratios.items() if each]  # fmt: skip
     if said:
         yield all(median(each) > 1.0 for each in ratios.values() if each), (
-            "As the paper claims, impulses push the hand harder than springs alone: the largest force is "
+            "As the paper claims, impulses push harder than springs alone: the largest force on the hand is "
             f"{', and '.join(said)}.")
 
 
@@ -109,19 +110,19 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     parts = [part for part in claim.parts if not part.role and part.decided] if claim else []
     if claim is None or not parts:
         return
-    each = ", ".join(f"in {part.held} of {part.decided} starts in {part.named or part.name}" for part in parts)
+    each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
     starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        f"In {starts} starts we compared impulses (IAPB), springs alone (PB) and a rigid wall felt through a spring "
-        "(CBuc) with the path of the hand at a rigid wall. Where they clearly differ, impulses come nearest to it "
+        f"In {starts} starts we compared impulses, springs alone and a rigid wall felt through a spring. Of the starts "
+        "in which they clearly differ, impulses bring the hand's path nearest to that at a rigid wall in "
         f"{each}. The paper shows one start.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found = {name: closest_in(small)[name] for name in ("x", "y")}
-        each = " and ".join(f"in {name} in {ahead} of {told} starts" for name, (ahead, told) in found.items())
+        each = ", ".join(f"in {name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the pushed body, a peg, starts tilted by at most {degrees(Condition().tilt):.2f}° "
+            f"If the pushed peg starts tilted by at most {degrees(Condition().tilt):.2f}° "
             f"({Condition().tilt:g} rad), the hand's path with impulses is the nearest to that at a rigid wall: {each} "
-            "(starts too close to call are left out).")
+            "starts (the others are too close to call).")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -147,4 +148,4 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."
     told = f"Not computed: {', '.join(lacking)}." if lacking else said
-    return Fact("Known failures and missed targets", told, "asked", items=lines)
+    return Fact("Known failures", told, "asked", items=lines)

@@ -37,7 +37,7 @@ FIGURES = ("hero", "fig07", "fig08", "film-corner", "film-hole", "fig03")
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
 REAL = Path(__file__).parents[2] / "out" / "report.html"
 MOST_PRINTED = 6  # pages of paper for the first page
-ANSWERED = ("Tested", "✓ Holds", "✕ Fails", "✓ Energy", "Known failures", "What next?")  # one screen, two of a phone
+ANSWERED = ("Tested", "✓ Holds", "✕ Fails", "✓ Energy", "Known failures", "Next step")  # one screen, two of a phone
 BELOW = """([texts, depth]) => texts.filter((text) => {
     const found = [...document.querySelectorAll(".first dt")]
         .find((part) => part.textContent.replace(/\\s+/g, " ").startsWith(text));

@@ -84,8 +84,9 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Stable walls with impulses, and without", target="more with impulses, and none lost",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
-        miss=f"{lost} of {theirs.size:,} walls (pairs of stiffness and damping) are stable only without impulses, "
-             f"{there or 'none'} of them at the paper's damping" if lost else "")
+        miss=f"{lost} of {theirs.size:,} walls are stable only without impulses, {there or 'none'} at the paper's "
+             "damping"
+             if lost else "")
 
 
 def _hardness(study: Study, loop: Loop) -> Iterator[Row]:

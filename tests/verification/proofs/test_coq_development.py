@@ -11,7 +11,7 @@ import pytest
 
 from iapb.advice.certificate import EXPORT_HEAD, exported, judge_gains
 from iapb.errors import IapbError
-from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED
+from verification.finding import NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.proofs import all_proofs, coq_development, on_proofs
 from verification.proofs import coq_development as coq
 from verification.proofs.show import YES
@@ -153,7 +153,8 @@ def test_without_coq_nothing_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None
     found = coq.theorems(lambda *done: None, [])
     assert len(found) >= 6 and {theorem.coq for theorem in found} == {coq.NOT_RUN}
     finding = on_proofs([], (), found)
-    assert "not checked here" in finding.answer and len(finding.parts) == 1
+    assert "not checked here" in finding.answer and finding.parts[1].verdict == NOT_TESTABLE
+    assert finding.parts[1].optional and finding.verdict == finding.parts[0].verdict
 
 
 @pytest.mark.parametrize(("answer", "axioms", "verdict"), [
