@@ -17,7 +17,7 @@ from verification.complementarity.solvers import FACTORS, collections, study_rea
 from verification.complementarity.topic import REFERENCES
 from verification.cost import solvers as timings
 from verification.cost.calls import PRINTED
-from verification.cost.solvers import IAPB, IMPACT_TIMES, KERNEL, LEMKE_KERNEL, Size
+from verification.cost.solvers import DAQP, IAPB, IMPACT_TIMES, KERNEL, LEMKE_KERNEL, Size
 from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
 
 
@@ -58,7 +58,7 @@ def test_every_way_is_timed_on_every_size_and_gives_the_same_motion(monkeypatch:
     sizes = [Size(family, contacts) for family in ("patch", "pile") for contacts in (1, 3)]
     costs = IMPACT_TIMES.table(Study(), sizes)
     assert set(costs.select(("impacts", "contacts", "solver")).rows) == {
-        (*size, solver) for size in sizes for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, "daqp", "lemke")}
+        (*size, solver) for size in sizes for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, DAQP, "daqp", "lemke")}
     assert set(costs.column("outcome")) == {"solved"} and min(costs.column("samples")) >= 3
     assert all(row["least"] <= row["median"] <= row["largest"] for row in costs.records())
 
