@@ -84,8 +84,6 @@ TERMS: dict[str, tuple[str, str]] = {
     r"coherence|clustering|filters?": ("coherence, clustering", "the paper's two filters against false collisions. "
                                        "Coherence: a contact that moved less than the coherence distance in a step is "
                                        "the same contact and gets no impulse. Clustering: near contacts merge"),
-    r"facet jump|reach": ("facet jump, reach", "facet jump: the distance between a ball's contacts with two "
-                          "neighbouring facets; reach: the coherence distance"),
     r"[Ss]aturat\w+": ("saturated, scaled, spread", "impulses beyond the device's limits: each component cut at "
                       "its limit, all multiplied by one factor, or the rest given in later steps"),
     r"energy exchanged": ("energy exchanged", "the largest of kinetic energy, range of potential energy, and work of "
