@@ -143,7 +143,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lines = []
     for topic in sorted(topics, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
         if clauses := [part.miss for part in topic.parts if part.miss]:
-            more = f"; {len(clauses) - 1} more on the page {topic.title}" if len(clauses) > 1 else ""
+            more = f"; {len(clauses) - 1} more" if len(clauses) > 1 else ""  # the line is a link to the page
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."

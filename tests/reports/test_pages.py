@@ -306,7 +306,7 @@ def test_the_first_screen_names_our_failures_the_gravest_first_and_what_is_fast(
     topics = (*(topic(key, MIXED, f"miss of {key}", "more") for key in given), topic("engines", MIXED))
     (fact,) = (fact for fact in facts(Evidence(topics=topics)) if fact.label == "Known failures")
     assert [id for _, id in fact.items] == [*given[:-3:-1], *given[3:0:-1], given[0]]  # engines: not our failure
-    assert fact.items[0][0] == "Miss of exact-energy; 1 more on the page exact-energy"
+    assert fact.items[0] == ("Miss of exact-energy; 1 more", "exact-energy")
 
 
 # Quantities that several pages quote

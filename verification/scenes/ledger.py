@@ -153,7 +153,7 @@ def _of_residuals(table: Table) -> Iterator[Part]:
         "Residual at the scene's own time step; the absolute values of motion and springs are added",
         f"larger in {len(wide)} of {len(rows)} scenes{said and ': ' + said}",
         f"at most {WORTH_NAMING:.0f} % of the energy exchanged", MIXED if wide else REPRODUCED,
-        miss=f"in the scene “{_title(wide[0]['scene'])}” the absolute energy errors of the time steps add up to "
+        miss=f"in “{_title(wide[0]['scene'])}” the energy errors of the time steps add up to "
              f"{wide[0][OPEN]:.1f} % of the energy exchanged" if wide else "")
 
 
