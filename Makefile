@@ -37,7 +37,7 @@ $(PROJECT_STAMP): $(LOCK_STAMP)
 	@touch $@
 
 .PHONY: test
-test: lint types imports pytest ## everything that must pass: ruff, mypy, import contracts, pytest
+test: lint types imports pytest ## ruff, mypy, import contracts and the quick tests
 
 .PHONY: reproduce
 reproduce: setup ## regenerate every figure, table and claim into out/report.html; FULL=1 for the deep version
@@ -76,7 +76,7 @@ pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
 	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadfile -q $(PYTEST_ARGS)
 
 .PHONY: thorough
-thorough: setup ## the tests that `make test` leaves out: attacks and kills, a browser, the documents, Coq; CI runs them
+thorough: setup ## the slow tests: attacks and kills, out/report.html in a browser, docs/, Coq; CI runs them, too
 	@$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist loadfile -q -m thorough $(PYTEST_ARGS)
 
 .PHONY: deep

@@ -1,6 +1,6 @@
 """Ordinary scenes with their truths: what somebody tries on the first day, only friction and restitution set.
 
-Every scene runs at 1 kHz. A case has a scene, a quantity that is measured in any simulator, and its true value: a
+Every scene runs at 1 kHz. A case has a scene, a quantity of the motion, and its true value: a
 closed form where there is one, else an ordinary differential equation solved by DOP853 to 1e-11 or better, else a value
 that two independent computations converge to.
 """
@@ -33,7 +33,7 @@ GROUND = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [
 
 
 class Motion(NamedTuple):
-    """The motion of B bodies at n + 1 instants, in space (planar bodies lie in z = 0), whichever simulator made it."""
+    """The motion of B bodies at n + 1 instants, in space (planar bodies lie in z = 0)."""
 
     time: Floats  # (n + 1,) [s]
     place: Floats  # (n + 1, B, 3) origins of the body frames [m], world axes
