@@ -58,12 +58,18 @@ class Region:
 
 def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
     key = key.replace("_", " ")
-    least, most = ("" if end is None else f"{end:g}" if len(f"{end:g}") <= 5 else f"{end:.3g}" for end in (low, high))
+    least, most = "" if low is None else _inward(low, math.ceil), "" if high is None else _inward(high, math.floor)
     if low == high:
         return f"{key} = {least} {unit}".rstrip()
     if not least:
         return f"{key} <= {most} {unit}".rstrip()
     return f"{least} <= {key} <= {most} {unit}".rstrip() if most else f"{key} >= {least} {unit}".rstrip()
+
+
+def _inward(end: float, rounded: Callable[[float], int]) -> str:
+    """Return a bound with at most three digits; one that has more is rounded into the region."""
+    digits = 2 - math.floor(math.log10(abs(end))) if end else 0
+    return f"{end:g}" if len(f"{end:g}") <= 5 else f"{rounded(end * 10.0**digits) / 10.0**digits:.3g}"
 
 
 def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:

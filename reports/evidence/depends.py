@@ -30,7 +30,11 @@ PACKAGES: dict[str, tuple[str, ...]] = {
 
 
 def depends_of(stage: str) -> dict[str, str]:
-    """Return the external dependencies of a stage by name: hashes of folders (or ABSENT) and package versions."""
+    """Return the external dependencies of a stage by name: hashes of folders (or ABSENT) and package versions.
+
+    Those of a part of a topic, such as "complementarity, without times", are the topic's.
+    """
+    stage = stage.partition(",")[0]
     folders = {name: folder_hash(BESIDE / name) for name in FOLDERS.get(stage, ())}
     if stage in ("proofs", "Coq development"):
         folders |= {"Coq": coq_development.version(), "coq": folder_hash(coq_development.FOLDER),

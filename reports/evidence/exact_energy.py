@@ -28,10 +28,9 @@ _RUNS = ("Impulse: the one that the run recorded. Each of the last three numbers
          "equation: M (v⁺ − v⁻) = impulse, Jᵀp = impulse, Jv⁺ = −e Jv⁻.")
 _NOTE = ("The impacts have up to 8 coordinates and contacts. A family is one kind of random impacts. “Light "
          "directions”: velocities along the lightest directions of M; “600 decades”: masses and speeds of nearly all "
-         "sizes that doubles can represent. Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: impacts that the "
-         "clamp (the last step, which corrects rounding) undid, because every candidate near v⁺ would have gained "
-         "energy; such bodies are not stopped. Energy cost: the extra loss at e = 1 by the clamp, in units of 10 d ε "
-         "√κ(M), d coordinates.")
+         "sizes that doubles can represent. Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: v⁺ = "
+         "v⁻, because no velocity that the clamp (the last step, which corrects rounding) tried was free of gain. "
+         "Energy cost: the extra loss at e = 1 by the clamp, in units of 10 d ε √κ(M), d coordinates.")
 
 
 def _certified(study: Study, name: str) -> list[Row]:

@@ -73,9 +73,9 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     read = attempt("all of it", partial(runs.figure_runs, runner, partial(progress, FIGURE_RUNS), lost), lost)
     tilted = attempt(runs.TILTED, partial(runs.tilted_runs, runner), lost)
     for stage in stages.values():
-        ahead = stages.get(stage.name + AHEAD)
+        ahead, fresh = stages.get(stage.name + AHEAD), not stage.path.is_file()
         _fill(stage, runner, depth, progress, ahead)
-        if ahead is not None:
+        if ahead is not None and fresh:
             ahead.failures.clear()  # the topic has tried these cases again
 
     def finding(name: str, said: Callable[..., Finding]) -> Finding:
@@ -156,7 +156,7 @@ def _figure_runs(out: Path) -> Stage | None:
 def _compile_ahead(out: Path, depth: str) -> None:
     """Compute one case of checks that measure times, in a worker, and drop it: later their kernels are compiled."""
     study = Study(Runner(out / "runs"), depth)
-    judge.warm_up()
+    attempt("", judge.warm_up, [])
     for check in COMPILED_AHEAD:
         attempt("", lambda check=check: check.table(study, list(check.cases(study))[:1]), [])  # type: ignore[misc]
 

@@ -29,8 +29,8 @@ TERMS: dict[str, tuple[str, str]] = {
                                               "the same worlds with Coulomb friction in their impacts or constraints"),
     r"PB, stiffened": ("PB, stiffened", "PB with walls as stiff as the time step permits; other PB has the paper's "
                        "1000 N/m"),
-    r"IAPB-push": ("IAPB-push", "the world IAPB with impulses that only push, found from two complementarity "
-                   "problems"),
+    r"IAPB-push": ("IAPB-push", "the world IAPB with impulses that only push (Poisson's law: a complementarity "
+                   "problem for the compression, and one for the rebound)"),
     r"IAPB LM": ("IAPB LM", "IAPB with each impulse spread over several steps, to stay within the device's limits"),
     r"four[- ]channels?": ("four-channel coupling", "device and tool exchange both positions and both forces, so that "
                            "the hand feels the contact force directly"),
@@ -63,9 +63,9 @@ TERMS: dict[str, tuple[str, str]] = {
                      "never exceeds that at the start plus the work done on it"),
     r"factored": ("factored", "the engine's method for one impact: it factors M and projects the velocity with an "
                   "orthonormal basis of the rows"),
-    r"(?:no|without|the) clamp": ("clamp", "the last operation of an impact: the smallest correction of the velocity "
-                                  "after which rounding has added no energy; if there is none, the change of velocity "
-                                  "is shortened"),
+    r"(?:no|without|the) clamp": ("clamp", "the last operation of an impact: it moves v⁺ by a few units in the last "
+                                  "place until the exact energy is not above that before the impact; if no such v⁺ "
+                                  "is found, it shortens v⁺ − v⁻, at worst to zero"),
     r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, the velocity "
                                                    "by the impulse (20), in numpy"),
     r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "

@@ -91,6 +91,7 @@ def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path, mon
         (tmp_path / "problems").mkdir(exist_ok=True)
         (tmp_path / "problems" / "case.txt").write_text(text)
         found.append(depends.depends_of("complementarity"))
+        assert depends.depends_of("complementarity" + topics.AHEAD) == found[-1]
     made = [Stage(tmp_path, "a", int, "quick", one) for one in found]
     made += [Stage(tmp_path, "a", int, "full"), Stage(tmp_path, "b", int, "quick")]
     for name in ("evidence_version", "this_machine"):

@@ -320,8 +320,8 @@ C12 = peg_claim(
     limited=True, rigid=True, fresh=FEW, place="Section VI, Fig. 9",
     quantity="RMS distance of the device trajectory from that of the ideal world, per coordinate; largest overlap of "
     "the device's peg and the walls; settling time of C15. The paper says of saturated impulses that the overlap is "
-    "largest and that the settling time increases. Beyond the paper: that it is the longest, and both quantities for "
-    "spread impulses. No friction.",
+    "largest and that the settling time increases (“transient response is poorest”). Beyond the paper: that it is the "
+    "longest, and both quantities for spread impulses. No friction.",
     tolerance="Saturating: strictly the largest of the three; the settling time: strictly longer than with full "
     "impulses. Spreading: strictly the smallest. A trial cannot tell if no impulse reaches the limit, or if the "
     "difference to the next rendering is below 2.5e-5 m in x, 5e-5 m in y and in the overlap, 5e-3 rad in rotation "

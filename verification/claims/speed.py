@@ -121,9 +121,9 @@ def _ratio_says(table: Table) -> str:
         texts.append(f"For {part} it is {', '.join(shown.values())} with {', '.join(map(str, shown))} contacts. It is "
                      f"clearly above 1 {above}, and clearly below 1 {below}; {rows.holds.count(None)} of "
                      f"{len(rows.rows)} sizes cannot tell.")  # fmt: skip
-    return ("The paper speaks of whole time steps with constraint stabilization. They are not timed here. Beyond the "
-            "paper: the ratio is the time of one frictionless impact by Lemke's method over that by IAPB, both "
-            f"compiled. {' '.join(texts)} The paper's scene has at most six collisions at once.")
+    return ("The paper speaks of whole time steps with constraint stabilization. Here complementarity is not timed in "
+            "them. Beyond the paper: the ratio is the time of one frictionless impact by Lemke's method over that by "
+            f"IAPB, both compiled. {' '.join(texts)} The paper's scene has at most six collisions at once.")
 
 
 C22 = Check(

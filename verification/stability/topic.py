@@ -84,9 +84,8 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Stable walls with impulses, and without", target="more with impulses, and none lost",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
-        miss=f"{lost} of {theirs.size:,} walls are stable only without impulses, {there or 'none'} at the paper's "
-             "damping"
-             if lost else "")
+        miss=f"{lost} of {theirs.size:,} walls are stable only without impulses ({there or 'none'} at the paper's "
+             f"damping), {int((ours & ~theirs).sum())} only with them" if lost else "")
 
 
 def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
@@ -142,7 +141,8 @@ contact_stability = Topic(
     "the motion between samples is exact. “Late” sensors: readings, rounded to 1 µm, and forces each come one step "
     "late. A wall is stable if the mass comes to rest: in the last quarter of three seconds it is slower than 1 mm/s "
     "and never leaves the wall. Then the paper's peg moves into its corner in the engine's own loop. Colgate's "
-    "condition, b >= KT/2 + |B| with the device's damping b and the period T, makes a wall passive for every hand.",
+    "condition, b >= KT/2 + |B| with the device's damping b and the period T, makes a wall passive for every hand, if "
+    "sensors are ideal and the wall is a spring and damper.",
     checks=(MAPS, DAMPINGS, HARDNESS, PEG, PORT),
     says=lambda tables, parts: parts[0].sentence if "maps" in tables else "",
 )

@@ -29,7 +29,7 @@ from verification.finding import (
     verdict_of_trials,
     with_failures,
 )
-from verification.region import LEAST_CONFIRMING, search_region
+from verification.region import LEAST_CONFIRMING, Region, search_region
 from verification.table import table_from
 
 YES, NO, UNKNOWN = True, False, None
@@ -45,6 +45,11 @@ def table(rows, holds, **marks):
     ([NO], REFUTED), ([UNKNOWN, UNKNOWN], NOT_TESTABLE), ([], NOT_TESTABLE)])  # fmt: skip
 def test_verdict_follows_from_the_trials(holds, verdict):
     assert verdict_of_trials(holds) == verdict
+
+
+def test_a_printed_range_never_exceeds_the_confirmed_one():
+    assert str(Region((("jump", "", 1.0521, 1.4099), ("tilt", "rad", 0.00033331, 0.015)))) == (
+        "1.06 <= jump <= 1.4 and 0.000334 <= tilt <= 0.015 rad")
 
 
 @pytest.mark.parametrize(("verdicts", "verdict"), [
