@@ -246,8 +246,7 @@ ERRORS = Check(
     cases=lambda study: product(SIMULATORS, FIXED_SCENES), row=_rows, says=_says, digits=2,
     note="The errors of energy, momentum and velocity are relative to the kinetic energy at the start, the sum of m "
     "|v| and the largest speed. In resting scenes the rise of energy is relative to m g times the bodies' size. "
-    "The outcome is right (“met”) if all errors are at most 1 % or, at rest, if nothing moves by more than 1 mm. "
-    "Drift: largest distance from the start; creep: movement in the second half.",
+    "The outcome is right (“met”) if all errors are at most 1 % or, at rest, if nothing moves by more than 1 mm.",
 )
 engines = Topic(
     key="engines", title="Other engines",

@@ -34,8 +34,8 @@ def _kernels_say(table: Table) -> Part:
     slower = table.that(False)
     sizes = {name: slower.where(problem=name)["contacts"] for name in dict.fromkeys(slower["problem"])}
     tried = {name: len(table.where(problem=name).rows) for name in sizes}
-    where = " and ".join(f"at {len(found)} of {tried[name]} sizes of a {name.split()[-1]} ({min(found)} to "
-                         f"{max(found)} contacts)" for name, found in sizes.items())  # fmt: skip
+    where = " and ".join(f"at {len(found)} of {tried[name]} sizes of a {name.split()[-1]} (contacts: "
+                         f"{' to '.join(map(str, sorted({min(found), max(found)})))})" for name, found in sizes.items())
     return faster("both methods compiled", "Lemke's method", "impacts", table.holds, where)
 
 

@@ -66,8 +66,9 @@ TERMS: dict[str, tuple[str, str]] = {
     r"(?:no|without|the) clamp": ("clamp", "the last operation of an impact: it moves v⁺ by a few units in the last "
                                   "place until the exact energy is not above that before the impact; if no such v⁺ "
                                   "is found, it shortens v⁺ − v⁻, at worst to zero"),
-    r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper, the velocity "
-                                                   "by the impulse (20), in numpy"),
+    r"printed formula|printed, numpy|as printed": ("printed formula", "equation (21) of the paper as it stands, "
+                                                   "v⁺ = v⁻ − (1 + e) M⁻¹Jᵀ W† J v⁻ with W = J M⁻¹Jᵀ and "
+                                                   "its pseudo-inverse W†, in numpy"),
     r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "
                                             "impact: the printed formula, the Cholesky factor of W, the inverse of W "
                                             "plus a small diagonal matrix, and the singular values of J"),

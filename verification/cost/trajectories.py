@@ -466,7 +466,7 @@ WORTH = Check(
     cases=lambda study: worth(study.table(MOTIONS), WORLDS).by_title(), timed=(
         "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
-    note="Errors are those of position; “least error” is the median over the scenes of their least errors. Cost: the "
+    note="Errors are those of position; the smallest error is a median over the scenes. Cost: the "
     "factor in computing time for a tenth of the error, fitted to those consecutive time steps between which the error "
     f"falls by a factor of at least {GAINED:g}. A fit needs {FIT_RUNS} runs and a total fall by a factor of "
     f"{FIT_FALL:g}, and is never extrapolated. Best for its time: number of scenes in which no other run is both "
