@@ -190,9 +190,9 @@ def counted(part: Part) -> str:
     if not (region := part.region):
         return f"{part.held} of {part.decided}{cases}{unknown}"
     share = f"; {region.share:.0%} of the tested range" if region.share else ""
-    new = f" and by {region.fresh} new trials" if region.fresh else ""
+    new, without = (f" and by {region.fresh} new ones", ", without new trials,") if region.fresh else ("", "")
     return (f"(range chosen from {region.searched} trials, confirmed by {region.others} others{new}{share}); over all "
-            f"conditions, without new trials, {part.held} of {part.decided}{cases}{unknown}")  # fmt: skip
+            f"conditions{without} {part.held} of {part.decided}{cases}{unknown}")  # fmt: skip
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure]) -> tuple[tuple[str, Table], ...]:
