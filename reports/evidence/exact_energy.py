@@ -13,6 +13,7 @@ import numpy as np
 from iapb import certify
 from iapb.contact.laws import ENGINE_LAWS
 from reports.batches import cores, processes
+from reports.store.io import opened
 from reports.store.runs import read_run
 from verification.check import Check, Study, Topic
 from verification.finding import NOT_TESTABLE, Part, attempt, verdict_of_law
@@ -44,8 +45,11 @@ def _rows(folder: Path, name: str) -> list[Row]:
 
     Rigid worlds are left out: they solve for the impulses and forces of a step together and record no separate impact.
     """
+    with opened(folder / name) as file:  # to read all of a run takes ten times as long
+        if file["law/name"].asstr()[()] not in ENGINE_LAWS:
+            return []
     run = read_run(folder / name)
-    if run.law not in ENGINE_LAWS or not len(run.impacts.step):
+    if not len(run.impacts.step):
         return []
     one = certify(run)
     return [{"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains,
