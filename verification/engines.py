@@ -252,10 +252,10 @@ engines = Topic(
     key="engines", title="Other engines",
     question="Every installed engine simulates eight frictionless scenes (listed below) whose outcome is known, from "
     "symmetry and the conservation of energy and momentum, or because nothing must move. Each scene runs twice. "
-    "“Own”: one general setting with the step that suits the engine, the same for all impacts. “Matched”: a step of 1 "
+    "“Own”: settings and a step that suit the engine, chosen by one rule for all impacts. “Matched”: a step of 1 "
     "ms, with the settings of least error on a grid; for MuJoCo and Drake they are chosen for each scene "
-    "(docs/engines.md) and can have the smaller error. Our engine and our ideal world run with their defaults, a step "
-    "of 1 ms, so that both runs are the same. MuJoCo and Drake have no coefficient of restitution; damped springs "
+    "(docs/engines.md) and can be more exact than “own”. Our engine and our ideal world run with their defaults, a "
+    "step of 1 ms, so that both runs are the same. MuJoCo and Drake have no coefficient of restitution; damped springs "
     "replace it. Overlap is shown, but does not decide the outcome.",
     checks=(ERRORS, Check(key="settings", question="With which settings did the engines run?",
                           cases=lambda study: SIMULATORS, row=_settings),

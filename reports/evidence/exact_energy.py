@@ -25,8 +25,8 @@ _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
 _SLOW = ("subnormal velocities",)  # takes 2 ms an impact, the others some µs: a quarter of the impacts
 CERTIFIED_RUNS = "certified runs"  # the check that needs the runs of all other stages
 FEW = 100  # runs that are certified in this process, which is faster than to start others
-_RUNS = ("Impulse: the one that the run recorded. Each of the last three numbers is the largest relative error of an "
-         "equation: M (v⁺ − v⁻) = impulse, Jᵀp = impulse, Jv⁺ = −e Jv⁻.")
+_RUNS = ("Impulse: the recorded generalized impulse; p: the recorded impulses at the contacts. Each of the last three "
+         "numbers is the largest relative error of an equation: M (v⁺ − v⁻) = impulse, Jᵀp = impulse, Jv⁺ = −e Jv⁻.")
 _NOTE = ("The impacts have up to 8 coordinates and contacts. A family is one kind of random impacts. “Light "
          "directions”: velocities along the lightest directions of M; “600 decades”: masses and speeds of nearly all "
          "sizes that doubles can represent. Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: v⁺ = "
@@ -87,7 +87,7 @@ def verdict_of_families(holds: Iterable[bool | None]) -> str:
 def _recorded_says(table: Table) -> Part:
     gains, impacts = _sums(table)
     return Part(f"In {len(table.rows):,} simulations with our engine iapb, {gains or 'none'} of "
-                f"{impacts:,} impacts gained energy, computed in exact arithmetic", "",
+                f"{impacts:,} impacts gained energy; the energies are computed exactly", "",
                 quantities=(("impacts certified", f"{impacts:,}"),), target="none",
                 asked="Impacts that gain energy, in all runs", measured=f"{gains or 'none'} of {impacts:,}")
 
@@ -95,9 +95,10 @@ def _recorded_says(table: Table) -> Part:
 def _drawn_says(table: Table) -> Part:
     least = floor(1000.0 * min(table.column("moved"), default=0.0)) / 1000.0  # never rounded up
     moved = f"at least {least:.1%} of the impacts of each kind changed the velocity"
+    whole = f"{moved}, so that it could have gained energy"
     return Part(f"{_adverse(table)}; {moved}", "", quantities=(("adverse impacts certified", f"{_sums(table)[1]:,}"),),
                 target="none", asked="Random impacts, drawn to provoke a gain, that gain energy",
-                measured="{} of {:,}; {}".format(*_sums(table), moved))  # fmt: skip
+                measured="{} of {:,}; {}".format(*_sums(table), whole))  # fmt: skip
 
 
 def _adverse(table: Table) -> str:

@@ -27,7 +27,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
         (name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
         for name, one in repeated])  # fmt: skip
     tables = {"simulated again": table}
-    return finding_of("survival", "Runs that survive", LEAD, part.sentence, (part,), tables, failures)
+    return finding_of("survival", "Runs that repeat", LEAD, part.sentence, (part,), tables, failures)
 
 
 def _repeated(runner: Runner, name: str) -> Any:

@@ -80,7 +80,7 @@ _COUNTS = (5, 10, 20, 50, 100, 200)  # ticks
 def where_to_stop(numbers: Table) -> Drawn:
     """Draw over the contacts how often (21) is right, and how many of its impulses pull."""
     rows = numbers.records()
-    looks = looks_of(f"(21) for {given} contacts" for given in numbers.column("rows"))
+    looks = looks_of(f"(21) for all {given} contacts" for given in numbers.column("rows"))
     limit = max(row["most contacts that agree"] for row in rows)
     wrong = min((row["contacts"] for row in rows if row["share that agrees"] < 1.0), default=limit + 1)
     prices = [row["time of pushing"] / row["time of (21)"] for row in rows]

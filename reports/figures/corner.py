@@ -47,7 +47,8 @@ _NEAR, _SMALL = 11, 0.1  # a pulse has no counterpart if none of this share of i
 _DRAWN = ((0, "force along x", "Fx", "N", (-0.4, 1.5)), (2, "torque", "τ", "N m", (-0.03, 0.03)))
 # What is measured, and its column in the tables
 _DISTANCES = {"x": "distance from ideal: x [mm]", "y": "y [mm]", "angle": "θ [°]"}
-_MOTION = {"depth": "penetration [mm]", "apart": "tool–device [mm]", "impacts": "impacts", "settled": "settled at [s]"}
+_MOTION = {"depth": "penetration [mm]", "apart": "largest distance of tool and device [mm]", "impacts": "impacts",
+           "settled": "settled at [s]"}
 _FORCES = {"Fx": "peak |Fx| [N]", "Fy": "peak |Fy| [N]", "torque": "peak |τ| [N m]", "held Fx": "held Fx [N]",
            "held Fy": "held Fy [N]", "held torque": "held τ [N m]"}  # fmt: skip
 _FROM_IDEAL = "Distances from the ideal trajectory are root mean squares over the whole run, on the device side. "

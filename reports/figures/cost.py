@@ -242,7 +242,7 @@ def _worth_said(row: Row, step: float) -> tuple[str, ...]:
         best = f"{row['best for its time']} of {scenes} scenes, {' to '.join(errors)}"
     made = "none"
     if row["energy made"] > accuracy.NO_GAIN:
-        made = f"up to {100 * row['energy made']:.2g} %, at {step:g} ms"
+        made = f"up to {100 * row['energy made']:.2g} %, step {step:g} ms"
     return row["called"], cost, power_of_error(row["least error"]), best, made
 
 
@@ -279,7 +279,7 @@ def anytime(numbers: Table) -> Drawn:
     looks, panels, ranges = looks_of(sizes), [], {}
     for key, name, alt, label in (
         ("velocity", "velocity left [%]", "Velocity left against the share of rows done.",
-         "normal velocity that is left, of that before the impact"),
+         "normal velocity left, share of that before"),
         ("energy", "energy loss missing [%]", "Missing loss against the share of rows done.",
          "missing part of the energy that the complete impact takes"),
     ):  # fmt: skip

@@ -67,7 +67,8 @@ def contact_forces(run: Run) -> Drawn:
                             f"normals: {told}.", title))  # fmt: skip
         rows += [(title[4:], float(run.time[step]), *map(float, 1e3 * run.contacts.point[k, :2]), float(values[k]),
                   unit) for k in contacts]  # fmt: skip
-    return Drawn(panels, titled(("instant", "t [s]", "contact x [mm]", "y [mm]", "along the normal", "unit"), rows))
+    return Drawn(panels, titled(("instant", "t [s]", "contact x [mm]", "y [mm]", "impulse or force along the normal",
+                                 "unit"), rows))
 
 
 LENGTH = 1.0  # of both links [m]
@@ -135,7 +136,7 @@ def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
         panels.append(Panel(plot.svg, (
             f"Kinetic energy after a collision at {contact} over the coefficient of restitution. At e = 0 uniform rods "
             f"keep {rods:.4f} J of 2.3333 J, point masses {masses:.4f} J of 5 J; at e = 1 all of it is kept."),
-            f"({letter}) Collision at {contact}, {CONTACTS[contact]} m"))  # fmt: skip
+            f"({letter}) Collision at {contact}, {CONTACTS[contact]} m along the second link"))  # fmt: skip
     shown = [int(np.argmin(abs(e - at))) for at in (0.0, 0.25, 0.5, 0.75, 1.0)]
     series = [f"{reading}, {contact}" for reading in READINGS for contact in CONTACTS]
     rows = tuple((float(e[k]), *(float(energies[name][k]) for name in series)) for k in shown)
@@ -210,7 +211,8 @@ def couplings(scene: Mapping[str, Any]) -> Drawn:
         Panel(four.svg, "The hand pushes device and tool alike; the environment force of the tool goes to the device; "
               "a spring and damper joins device and tool.", "(b) four channels: ideal, IAPB, PB"),
     )  # fmt: skip
-    names = {"four_channel": ("K_coord", "B_coord"), "unilateral": ("K_cpl", "B_cpl")}
+    names = {"four_channel": ("K_coord (four channels)", "B_coord (four channels)"),
+             "unilateral": ("K_cpl (unilateral coupler)", "B_cpl (unilateral coupler)")}
     rows = tuple((name, *map(float, scene["couplings"][coupling][gain]), unit) for coupling, both in names.items()
                  for name, gain, unit in zip(both, ("stiffness", "damping"), ("N/m, N m/rad", "N s/m, N m s/rad"),
                                              strict=True))  # fmt: skip

@@ -54,8 +54,9 @@ def hero(tilted: Mapping[float, Mapping[str, Run]]) -> Drawn:
                              for tilt, runs in tilted.items()})  # fmt: skip
     rows = tuple((np.degrees(tilt), *(MILLI * each[ALL_THREE][name] for name in WORLDS),
                   *(_nearest(each[part]) for part in NAMED)) for tilt, each in found.items())  # fmt: skip
-    numbers = titled(("tilt [°]", *(f"{name} to ideal [mm]" for name in WORLDS), *NAMED.values()), rows, digits=3, note=
-                     "Distances: root mean square of √(Δx² + Δy² + (50 mm Δθ)²); 50 mm: the peg's radius of gyration.")
+    columns = ("tilt [°]", *(f"{name} to ideal [mm]" for name in WORLDS), *map("nearest, {}".format, NAMED.values()))
+    numbers = titled(columns, rows, digits=3, note="Distances: root mean square of √(Δx² + Δy² + (50 mm Δθ)²); 50 mm: "
+                     "√(inertia / mass) of the peg, as the paper gives them.")
     said = "; ".join(f"{part} {_nearest(found[shown][part])}" for part in NAMED)
     panels = (
         Panel(canvas.svg.replace("</svg>", moves + "</svg>"), "A tilted peg moves to the lower right into a corner.",

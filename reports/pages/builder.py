@@ -190,8 +190,10 @@ def counted(part: Part) -> str:
     if not (region := part.region):
         return f"{part.held} of {part.decided}{cases}{unknown}"
     share = f"; {region.share:.0%} of the tested range" if region.share else ""
-    new, without = (f" and by {region.fresh} new ones", ", without new trials,") if region.fresh else ("", "")
-    return (f"(range chosen from {region.searched} trials, confirmed by {region.others} others{new}{share}); over all "
+    both = (region.others, "others"), (region.fresh, "new ones")
+    confirmed = " and ".join(f"{count} {which}" for count, which in both if count)
+    without = ", without new trials," if region.fresh else ""
+    return (f"(range chosen from {region.searched} trials, confirmed by {confirmed}{share}); over all "
             f"conditions{without} {part.held} of {part.decided}{cases}{unknown}")  # fmt: skip
 
 

@@ -19,9 +19,9 @@ from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
     "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv; equations (18) and (24) lack the ½. The matrix in (37) is not the "
-    "pseudo-inverse of W = J M⁻¹Jᵀ, but the conclusion (33) is true. Equations (13) and (14) give each of two touching "
-    "bodies an impulse of its own, so that momentum is not conserved. The impulse (20), which gives the velocity (21), "
-    "can add energy by rounding if it is computed as printed."
+    "pseudo-inverse of W = J M⁻¹Jᵀ, but (33) is true: redundant rows do not change v⁺. Equations (13) and "
+    "(14) give each of two touching bodies an impulse of its own, so that momentum is not conserved. The impulse (20), "
+    "which gives the velocity (21), can add energy by rounding if it is computed as printed."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
@@ -63,7 +63,8 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
     told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} tests decide these "
-                 f"verdicts; in {unknown:,} more the values differ by less than their error.", "claims")
+                 f"verdicts; {unknown:,} more cannot, because the compared values differ by less than their error.",
+                 "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
         if text := " ".join(said for held, said in found if held is wanted):
@@ -113,21 +114,21 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
     starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        f"In {starts} starts we compared impulses, springs alone and a rigid wall felt through a spring. "
-        f"Where they clearly differ, impulses bring the hand's path nearest to that at a rigid wall in {each}.")
+        "The paper says: impulses bring the hand's path nearer to that at a rigid wall than springs alone do, or a "
+        f"coupling by a spring. Of {starts} starts this holds, where the paths clearly differ, in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
-        found = {name: closest_in(small)[name] for name in ("x", "y")}
+        found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = ", ".join(f"in {name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the pushed peg starts tilted by at most {degrees(Condition().tilt):.2f}° "
-            f"({Condition().tilt:g} rad), the hand's path with impulses is the nearest to that at a rigid wall: {each} "
-            "starts (the others are too close to call).")
+            f"If the peg, the paper's example, starts tilted by at most {degrees(Condition().tilt):.2f}° "
+            f"({Condition().tilt:g} rad), impulses bring the hand's path nearest to that at a rigid wall: {each} that "
+            f"can tell, of {of} starts.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
     """Yield the time of a step against the budget of a loop and against MuJoCo, and where Lemke's method is faster."""
     if step := peg_step(evidence):
-        yield f"A step of the peg in the corner takes {step}; a loop at 1 kHz allows 1000 µs."
+        yield f"A time step of the peg in the corner takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
         ratios = sorted(float(row["ratio"]) for row in hardest(races))
         yield (f"In {len(ratios)} scenes at rest or nearly so, our step is {1.0 / ratios[-1]:.2g} to "
@@ -142,7 +143,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lines = []
     for topic in sorted(topics, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
         if clauses := [part.miss for part in topic.parts if part.miss]:
-            more = f"; {len(clauses) - 1} more" if len(clauses) > 1 else ""  # the line is a link to the page
+            more = f" (on its page {len(clauses) - 1} more)" if len(clauses) > 1 else ""  # the line links to the page
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."

@@ -61,7 +61,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(TIME, "accuracy", "Accuracy against time", "", ("accuracy",)),
     _topic(TIME, "haptic-rate", "The haptic rate"),
     Section(TIME, "effects", "Effects", "effects", ("effects",)),
-    _topic(DATA, "survival", "Runs that survive"),
+    _topic(DATA, "survival", "Runs that repeat"),
     Section(DATA, "provenance", "Provenance", "provenance"),
     Section(DATA, "manifest", "Manifest", "manifest"),
 )

@@ -71,7 +71,7 @@ TERMS: dict[str, tuple[str, str]] = {
                                                    "its pseudo-inverse W†, in numpy"),
     r"gram_pinv|gram_cholesky|damped|svd": ("gram_pinv, gram_cholesky, damped, svd", "other methods for the same "
                                             "impact: the printed formula, the Cholesky factor of W, the inverse of W "
-                                            "plus a small diagonal matrix, and the singular values of J"),
+                                            "with a little added to its diagonal, and the singular values of J"),
     r"anytime|stop(?:s|ped) early": ("stopped early", "the impact ends when its budget of rows or time is used up, "
                                      "with the rows resolved so far"),
     r"(?:Newton )?LCPs?|complementarity": ("LCP", "linear complementarity problem: impulses only push (p ≥ 0). A "
@@ -91,9 +91,9 @@ TERMS: dict[str, tuple[str, str]] = {
                           "hand and of coupling"),
     r"event[- ]driven|event by event": ("event-driven", "the exact motion between impacts, with each impact located "
                                         "in time"),
-    r"Colgate(?:'s)? (?:passivity )?(?:bound|condition)": ("Colgate's condition", "device damping b ≥ K T/2 + |B|: a "
-                                            "sampled wall of stiffness K and damping B, read every T seconds, is then "
-                                            "passive"),
+    r"Colgate(?:'s)? (?:passivity )?(?:bound|condition)": ("Colgate's condition", "device damping b ≥ K T/2 + |B|, or "
+                                            "K ≤ 2 (b − |B|)/T: a wall of stiffness K and damping B, read every T "
+                                            "seconds, is then passive"),
     r"planted": ("planted fault", "an error put into the code on purpose, to show that the check finds it"),
     r"peg": ("peg", "the paper's example: a rectangular body, moved by the hand in a plane, that meets a corner or a "
              "hole"),
@@ -104,7 +104,7 @@ HEADINGS: dict[str, str] = {
     "negative share of p": "pulling impulses / sum of |p|",
     "median distance from the LCP": "median distance of (21) from the LCP",
     "pushing from the LCP": "largest distance of pushing impulses from the LCP",
-    "contradicted by least squares": "piles where least squares contradicts “agrees”",
+    "contradicted by least squares": "piles where a second test (least squares) disagrees",
     "largest change of KE": "largest (KE⁺ − KE⁻)/KE⁻",
     "smallest fault seen": "smallest error detected",
     "M Δv − impulse": "error of M Δv = impulse", "Jᵀp − impulse": "error of Jᵀp = impulse",
@@ -120,7 +120,7 @@ HEADINGS: dict[str, str] = {
     "most exact there": "smallest error at which it is best", "least exact there": "largest error at which it is best",
     "cut short [scenes]": "scenes with finer steps too slow", "passive up to [N s/m]": "largest passive damping B [N "
     "s/m]",
-    "there": "exponent there",
+    "there": "exponent there", "MuJoCo's form": "MuJoCo's shapes", "velocities": "joint velocities",
 }  # fmt: skip
 PLACE = "<!-- terms -->"
 _NOT_READ = re.compile(r"<(script|style|nav|head)\b.*?</\1>|<[^>]*>", re.DOTALL)

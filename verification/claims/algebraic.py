@@ -137,9 +137,9 @@ NEVER_GAINS = Measure(lambda batch: worst(max(float(impact.energy_after - impact
 
 PASSIVE = "kinetic energy does not rise"
 EXACTLY_PASSIVE = "kinetic energy does not rise, in rationals"
-WITH_HALF = "loss is ½(1 − e²) times the form"
-AS_PRINTED = "loss is (1 − e²) times the form"
-EXACT_LOSS = "loss is ½(1 − e²) times the form, in rationals"
+WITH_HALF = "loss is ½(1 − e²) vᵀJᵀW†Jv"
+AS_PRINTED = "loss is (1 − e²) vᵀJᵀW†Jv"
+EXACT_LOSS = "loss is ½(1 − e²) vᵀJᵀW†Jv, in rationals"
 CAN_GAIN = "By design the engine never gains; in doubles the printed (21) can (page Passive in floating point)."
 
 
@@ -393,11 +393,11 @@ C06 = batches(
 # C08: passive for every e in [-1, 1], scaled and spread as well
 
 RANDOM, EXACT = "random impacts", "random impacts, in rationals"
-RENDERED = {rendering: [f"{how} impacts of the peg, {what}" for what in ("energy gain", "|J v⁺ + e′ J v⁻|")]
+RENDERED = {rendering: [f"{how} impacts of the peg, {what}" for what in ("energy gain", "error of restitution")]
             for rendering, how in (("scale", "Scaled"), ("spread", "Spread"))}  # fmt: skip
 _SIZES, _RESTITUTIONS = ((1, 1, 1), (3, 6, 3), (6, 20, 4), (12, 60, 8)), (-1.0, -0.9, -0.5, 0.0, 0.5, 0.9, 1.0)
 _PASSIVE = batches(
-    "C08", "The resolution is passive for every e in [-1, 1]; scaled or spread impulses act like another e in [-1, 1].",
+    "C08", "An impact is passive for every e in [-1, 1]; scaled or spread impulses act like another e in [-1, 1].",
     place="Section VI",
     quantity="Largest relative gain of the tool's kinetic energy in one impact. If the share s of an impulse acts: "
     "also the largest |J v⁺ + e′ J v⁻| with e′ = s (1 + e) − 1, relative to |J v⁻|.",

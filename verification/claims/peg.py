@@ -50,7 +50,7 @@ from verification.table import Row, Table
 FEW, FRESH, MANY = 15, 30, 45
 ALL_THREE = "together"
 ARM = 0.05  # [m] √(inertia / mass) of the peg: the length of (x, y, θ) in the kinetic metric is √(x² + y² + (ARM θ)²)
-OVERLAP, SETTLING = "overlap of the device", "settling time"
+OVERLAP, SETTLING = "overlap of the device's peg", "settling time"
 # A trial cannot tell which world is closer to ideal if the lead of IAPB over its nearer rival is below these bands: in
 # RMS distance of the path [m, rad], and in mean distance of the force [N, N m]. With the ideal world at four times
 # the rate the lead changes by at most 7.9e-6, 2.0e-5, 2.9e-3 and 0.0018, 0.0029, 2.1e-4 (40 starts); the test
@@ -61,7 +61,7 @@ RESOLVED[ALL_THREE] = float(np.linalg.norm([RESOLVED["x"], RESOLVED["y"], ARM * 
 NAMED = {"x": "x", "y": "y", "rotation": "rotation", ALL_THREE: "all three together"}
 LIMITED = (*START, "force_limit")
 PAPERS = Condition().approach_velocity
-LARGER = "if only contacts faster than 1 or 10 mm/s collide"
+LARGER = "with a collision threshold (1 or 10 mm/s)"
 CANNOT_TELL = (
     "A trial cannot tell if the distances of IAPB and of its nearer rival differ by less than a shorter time step of "
     "the ideal world could change: 2.5e-5 m in x, 5e-5 m in y, 5e-3 rad in rotation, 2.6e-4 m together."

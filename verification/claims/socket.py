@@ -15,7 +15,7 @@ from verification.table import Row, Table
 
 BOTH = "both filters, coherence distance above speed × step (the paper's condition)"
 COHERENCE_ALONE, CLUSTERING = "coherence alone", "clustering alone"
-JUMP, REACH = "jump to the next facet", "relative coherence distance"
+JUMP, REACH = "jump of the contact to the next facet", "relative coherence distance"
 FACETS = (9, 18, 30, 60)  # in a right angle: 10° to 1.5° each
 CLUSTER = {"quick": (4.0,), "full": (4.0, 10.0)}  # [mm], more than the contacts at an edge are apart
 COHERENCE = (1.1, 1.5, 2.0, 3.0, 4.0, 6.0)  # of speed × step

@@ -130,7 +130,7 @@ C20 = Check(
 # C21: impulses against larger damping
 
 SAME_DAMPING, EQUAL_GAIN, BOTH, TUNED = RIVALS = (
-    "same damping, the paper's 50 N s/m", "penalties with the first force of the impulse",
+    "same damping, the paper's 50 N s/m", "penalties damped to the impulse's first force",
     "best damping of each law for each wall", "penalties at their best damping and impulses at the paper's",
 )
 WHEREVER, NO_LATER = TESTS = ("every wall that settles without impulses settles with them",

@@ -181,7 +181,7 @@ ACCURACY = Check(
     key="accuracy", question="How exact is an impact in the time that it takes?", cases=lambda _: _hard(SIZES),
     row=partial(_measured, WAYS, ROUNDS), timed=MEASURED, timed_rows=True, digits=3,
     note="Median CPU times of the thread; methods run in random order, with a warm-up call before each. Errors are "
-    "relative to exact rational arithmetic, in the kinetic metric. A loss of energy counts as a gain of zero.",
+    "distances from the exact v⁺ (fractions) over |v⁻|, in the kinetic metric. A loss of energy counts as no gain.",
 )  # fmt: skip
 
 

@@ -231,8 +231,8 @@ def _bodies_say(table: Table) -> Iterator[Part]:
                   LARGEST_POWER, "", more, quantities=(("exponent of bodies", f"{power:.3g}"),))  # fmt: skip
     last = rows[-1]
     yield limited("the tested pairs of shapes grow as the number of bodies to the power", power_law(bodies, pairs),
-                  LARGEST_POWER, "", f": {last['pairs tested']:.0f} of {last['pairs of shapes']:,} pairs for "
-                  f"{last['bodies']} free bodies", timed=False)  # fmt: skip
+                  LARGEST_POWER, "", f" ({last['pairs tested']:.0f} of {last['pairs of shapes']:,} pairs are tested "
+                  f"for {last['bodies']} free bodies)", timed=False)  # fmt: skip
 
 
 BODIES = Check(

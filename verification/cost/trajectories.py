@@ -457,8 +457,9 @@ MOTIONS = Check(
     row=motions_of, says=_motions_say, timed=("time", "outcome", "note"), digits=3,
     note="The truth is an event-driven solution with rigid walls. Under the constant push in the corner the springs of "
     "IAPB and PB yield, and no time step removes this error. Position: the largest distance from the truth, sampled "
-    "every millisecond, over the body's length. Energy at the end, simulated minus true (signed) and its size; energy "
-    "made: the largest rise above the start; all over the largest kinetic energy. An error smaller than the "
+    "every millisecond, over the body's length. Energy error: that at the end, as size and as simulated minus true; "
+    "energy made: the largest rise above the start; both relative to the largest kinetic energy. Time: of computing a "
+    "simulated second. An error smaller than the "
     "uncertainty of the truth is replaced by that uncertainty.",
 )  # fmt: skip
 WORTH = Check(
@@ -469,7 +470,7 @@ WORTH = Check(
     note="Errors are those of position; the smallest error is a median over the scenes. Cost: the "
     "factor in computing time for a tenth of the error, fitted to those consecutive time steps between which the error "
     f"falls by a factor of at least {GAINED:g}. A fit needs {FIT_RUNS} runs and a total fall by a factor of "
-    f"{FIT_FALL:g}, and is never extrapolated. Best for its time: number of scenes in which no other run is both "
-    f"faster and more exact, among errors up to {USEFUL:g} lengths. Energy made: the largest rise above the energy at "
-    "the start.",
+    f"{FIT_FALL:g}, and is never extrapolated. Best for its time: number of scenes with a run (error up to "
+    f"{USEFUL:g} lengths) that no other run beats in both time and error. Energy made: the largest rise above the "
+    "energy at the start.",
 )  # fmt: skip

@@ -59,7 +59,7 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     **_named(numerical.thousand_copies),
     "ten_thousand_contacts": partial(numerical.contacts, 10_000, "10,000 contacts of rank three",
                                      "time and memory: the Delassus matrix has 1e8 entries", "linear time and exact "
-                                     "rank; methods that form the Delassus matrix exceed the limit on time"),
+                                     "rank; methods that form the Delassus matrix need more than 2 s"),
     **_named(
         "nearly_parallel_normals", numerical.printed_formula_gains, numerical.hilbert_rows, numerical.kahan_rows,
         "mass_ratio", "tiny_lever_arm", "straight_arm", "face_at_three_points", "grazing", "subnormal_speeds",

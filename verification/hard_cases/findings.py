@@ -25,18 +25,19 @@ from verification.table import Table
 
 ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
 _NOTES = {
-    "impact": "Stable: gain and error at most those allowed, restitution residual at most 1e-8. Gain: (KE⁺ − KE⁻)/KE⁻, "
-              "computed exactly. Error: |v⁺ − truth| / |v⁻| in the kinetic metric; allowed is what rounding may cause "
+    "impact": "Stable: gain and error at most those allowed, relative restitution residual at most 1e-8. Gain: (KE⁺ − "
+              "KE⁻)/KE⁻, exactly. Error: |v⁺ − truth| / |v⁻| in the kinetic metric; allowed is what rounding may cause "
               "with a backward stable method, 10 n ε √κ_M (√κ_M + κ_A): n is the larger of c rows and d coordinates, "
               "κ_M the condition number of M scaled to a unit diagonal, κ_A that of A = J L⁻ᵀ with M = L Lᵀ. Smallest "
-              "error detected: relative, planted in the impulse or velocity of a stable answer. Time: median of a "
-              "call.",
+              "error detected: the smallest relative error which, put into a stable impulse or velocity, changes the "
+              "verdict. Time: median of a call.",
     "motion": "Stable: gain and error at most those allowed (what rounding or the time step may cause), restitution "
               "residual at most 1e-8. Gain: the largest amount of energy created, relative to the kinetic energy at "
               "the start plus the work of hand and gravity. Error: distance from the exact law, relative to its "
               "answer. Restitution residual: the largest of all collisions; in a collision of several contacts, their "
-              "mean, weighted by the impulses. Smallest error detected: relative, planted in the displacements and "
-              "changes of velocity of a stable motion. Time: median of a step.",
+              "mean, weighted by the impulses. Smallest error detected: the smallest relative error which, put into "
+              "the displacements and changes of velocity of a stable motion, changes the verdict. Time: median of a "
+              "step.",
 }  # fmt: skip
 
 
@@ -65,8 +66,7 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     rows = [{"case": case.title, "kind": case.details["kind"], **row, "note": ""}
             for case in tried for row in case.tables[case.key].by_title()]  # fmt: skip
     table = EVERY_METHOD.table_of(rows)
-    others = f" and {len(failing) - 1} more hard cases" if len(failing) > 1 else ""
-    miss = f"the engine fails in the hard case “{failing[0]}{others}" if failing else ""
+    miss = f"{len(failing)} of {len(ours)} hard cases fail{'s' * (len(failing) == 1)}: “{failing[0]}" if failing else ""
     parts = (Part(sentence, verdict, miss=miss, quantities=(stable,)),)
     tables = {EVERY_METHOD.key: table.without("note") if rows else table}
     return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures, (stable,))

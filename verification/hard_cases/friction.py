@@ -254,8 +254,8 @@ def stick_slip() -> TrajectoryCase:
     return TrajectoryCase(
         "Stick-slip oscillator and its limit cycle",
         "Den Hartog, Trans. ASME 53 (1931); the textbooks' block on a belt",
-        "in the limit cycle the plate is at rest for only an instant of each period, with the friction force exactly "
-        "at its limit μ m g",
+        "a plate pushed by a spring: in the limit cycle it is at rest for only an instant of each period, with the "
+        "friction force exactly at its limit μ m g",
         "the plate slides, sticks once, and then repeats the limit cycle, of period 2π/ω, for ever",
         "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "
         "v = V (1 − cos ωt), with V the speed of the spring's other end and ω the frequency of the plate on the spring",

@@ -58,7 +58,7 @@ def hilbert_rows() -> HardCase:
     return HardCase(
         "Hilbert rows, n = 8", "Hilbert (1894); the classical rank decision",
         "the exact rank is full, the condition number 1.5e10: singular values lie on both sides of any usual tolerance",
-        "restitution is met and no energy is gained; a method may keep any number of small singular values",
+        "restitution is met and no energy is gained; the rank is not judged",
         np.eye(n), rows, np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]), 0.5, well_posed=False,
     )  # fmt: skip
 
@@ -83,7 +83,7 @@ def light_direction() -> HardCase:
     return HardCase(
         "Velocity along M's lightest direction, κ(M) = 1e12",
         "backward error of Cholesky's factor: Higham, Accuracy and Stability (2002), chapter 10",
-        "Cholesky's backward error d ε κ(M) is as large as the energy's fifth digit",
+        "Cholesky's backward error, at most d ε κ(M) = 1e-3, reaches the energy's fifth digit",
         "no gain with the clamp; for other methods up to 10 d ε √κ(M) is allowed",
         mass, rows, axes[:, -1], 1.0,
     )  # fmt: skip

@@ -146,7 +146,7 @@ def _room(bodies: list[Values], name: str, x: float) -> Values:
     return {"bodies": [moved(body) for body in bodies], "walls": walls}
 
 
-@law(ENGINE_LAWS, "group_splitting", "two groups that share nothing move alike, simulated together or apart",
+@law(ENGINE_LAWS, "group_splitting", "a group moves the same, alone or beside another that it does not touch",
      draw_rooms, SceneCase.simulate)
 def groups_apart_move_alike(case: TwoRooms, subject: Callable[[SceneCase], Run]) -> Found:
     """Distance between the states of the joint and the separate run, at the first instant at which they differ.
@@ -292,7 +292,8 @@ def draw_held_device(rng: np.random.Generator) -> HeldDevice:
 
 
 @law(ENGINE_LAWS, "device_port",
-     "the hand gets no energy from a device coupled to a tool on a rigid wall if b ≥ K_cpl T/2 + B_cpl",
+     "a hand that keeps pressing gets no energy from a device coupled to a tool on a rigid wall if b ≥ K_cpl T/2 + "
+     "B_cpl",
      draw_held_device, actuator_forces)
 def device_port_is_passive(case: HeldDevice, subject: Callable[[DeviceLoop, Floats], Floats]) -> Found:
     """Leak relative to the energy exchanged with coupler and damper.

@@ -76,7 +76,7 @@ def impulse_comes_from_the_contacts(case: ImpactCase, resolver: Resolver, bounds
     return float(np.linalg.norm(outside)) / case.speed, bounds.comparison(every)
 
 
-@law(LAWS, "free_motion", "f(v + z) = f(v) + z for J z = 0")
+@law(LAWS, "free_motion", "v⁺(v + z) = v⁺(v) + z for J z = 0")
 def free_motion_is_kept(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """A motion z without any contact velocity, of kinetic norm |u|, is kept."""
     if not case.is_separated or case.speed == 0.0 or len(case.row_space) == case.coordinates:

@@ -182,8 +182,8 @@ def printed_formula() -> Finding:
     exact = exact_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).rounded_velocity
     sentence = (
         f"With {case.contacts} rows, {case.coordinates} coordinates and e = {case.restitution:g}, formula (21) as "
-        f"printed adds {gain:.2g} of the kinetic energy, computed in exact rationals. The passivity kit found and "
-        f"simplified this case by itself. {verdict.failures} of its {verdict.checked} impacts gained energy, at most "
+        f"printed adds {gain:.2g} of the kinetic energy (computed exactly). The function check_passivity found and "
+        f"simplified this case. {verdict.failures} of its {verdict.checked} random impacts gained energy, at most "
         f"{verdict.largest:.2g} of the energy before."
     )
     return counterexample("gram_pinv", verdict.statement, sentence, given | {"v⁺ exact, rounded": exact},
@@ -196,9 +196,9 @@ def restitution_per_contact() -> Finding:
                                           impacts=COUNTER_IMPACTS // 2, unequal_restitution=True)
     gain = relative_gain(case.mass_matrix, case.velocity, given["v⁺ as computed"])
     sentence = (
-        "Equalities with one restitution per contact, J v⁺ = −E J v⁻, multiply the kinetic energy by "
-        f"{1.0 + gain:.3g}. The passivity kit found and simplified this case. Where restitutions differ, the engine "
-        "uses Poisson's law (two LCPs), which is passive."
+        "Equalities with one restitution per contact, J v⁺ = −E J v⁻ with E = diag(e), multiply the kinetic energy by "
+        f"{1.0 + gain:.3g}. The function check_passivity found and simplified this case. If restitutions differ, the "
+        "engine uses Poisson's law (two LCPs), which is passive."
     )
     return counterexample("J v⁺ = −E J v⁻", verdict.statement, sentence, given, report.counterexample_test)
 

@@ -119,8 +119,8 @@ def filters(table: Table) -> Part:
         f"{1e3 * edge_jump():.1f} mm between contacts on neighbouring facets", f"for these dampings: {counts}",
         "none with both filters",
         REFUTED if len(left) == len(both.rows) else MIXED if left else REPRODUCED,
-        miss="a ball that rolls over flat facets gets false impulses despite the paper's two filters against them "
-             f"(wall damping {', '.join(left)} N s/m)" if left else "")  # fmt: skip
+        miss=f"at a wall damping of {', '.join(left)} N s/m, a ball that rolls over flat facets gets false impulses "
+             "despite the paper's two filters" if left else "")  # fmt: skip
 
 
 IN_TIME = Check(key="false collisions in time", question="When do the false collisions happen?", cases=_cases,

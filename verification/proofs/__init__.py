@@ -64,8 +64,8 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
          len(one.twins)) for one in records])  # fmt: skip
     proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
     confirmed = sum(one.sympy == YES for one in records)
-    sentence = (f"{proved} of {len(records)} statements about the formulas are proved: a program checks the "
-                f"certificate of every step. SymPy confirms {'all ' * (confirmed == proved)}{confirmed}. To test the "
+    sentence = (f"{proved} of {len(records)} statements about the formulas are proved: a program checks "
+                f"every step. SymPy confirms {'all ' * (confirmed == proved)}{confirmed}. To test the "
                 f"program, we also wrote {twins} false variants; it refutes each by an exact counterexample.")
     parts = [Part(sentence, REPRODUCED if proved == len(records) else REFUTED)]
     tables = {"statements": table}

@@ -207,7 +207,7 @@ def coordinated(ports: Table) -> Part:
         "Colgate's bound for the wall alone", f"up to {max(found['needed / bound']):.3g}: the device needs "
         f"{min(needed):.3g} to {max(needed):.3g} N s/m, because the hand also feels the coupling's "
         f"{COORDINATION[1]:g} N s/m. As a multiple of the bound for wall and coupling together: up to "
-        f"{max(map(truediv, needed, sums)):.3g}", "at most 1, which is proved for a fixed wall; here the tool moves",
+        f"{max(map(truediv, needed, sums)):.3g}", "at most 1, which is proved only if the tool rests",
         MIXED)
 
 
@@ -225,8 +225,8 @@ PORT = Check(
     key="hand port", question="How much damping does the device need so that the hand draws no energy from the loop?",
     cases=lambda study: product(WALLS[study.depth], SENSORS, MOTIONS), row=_leak,
     says=lambda table: (coupled(table), coordinated(table)),
-    note="The complete device loop at 512 Hz; the worst of several speeds of the hand. The hand moves by ±0.5 mm, so "
-    "that it always presses, or crosses the surface. Late: readings and forces each come one step late; coarse: "
+    note="The complete device loop at 512 Hz; the worst of several speeds of the hand. The hand moves by ±0.5 mm: "
+    "it always presses, or it crosses the surface. Late: readings and forces each come one step late; coarse: "
     "readings rounded to 10 µm. Stiffness and damping are those of the coupler in CBuc, else of the wall; the "
     "four-channel coupling has the gains of the paper's Table I. Leak: energy that the hand draws from the loop at "
     "b = KT/2 + |B|.",

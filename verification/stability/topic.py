@@ -56,7 +56,7 @@ def _of_maps(table: Table) -> Iterator[Part]:
     damped, bare = ideal & (b > 0.0), ideal & (b == 0.0)
     gains = int((passive & (theirs == GROWS))[damped].sum())
     yield Part.of(
-        "Walls that Colgate's condition calls passive, but at which the mass moves ever more (springs alone, ideal "
+        "Walls that Colgate's condition calls passive, but at which the mass moves ever more (penalties, ideal "
         "sensors, device with damping)",
         f"{gains or 'none'} of {passive[damped].sum()}. {(~passive & (theirs == SETTLES))[damped].sum()} walls at "
         "which the condition fails are stable, too: it is for the worst hand, ours is a constant force",
@@ -65,7 +65,7 @@ def _of_maps(table: Table) -> Iterator[Part]:
     shares = " and ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
                           for one in dict.fromkeys(rate[bare].tolist()))
     yield Part.of(
-        "Walls that are passive on a device without damping (b = 0, as in the paper), with springs alone and ideal "
+        "Walls that are passive on a device without damping (b = 0, as in the paper), with penalties and ideal "
         "sensors", f"none: Colgate's condition needs b > 0. Yet {shares} are stable under our constant force", "all",
         MIXED)
 
@@ -84,8 +84,9 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Stable walls with impulses, and without", target="more with impulses, and none lost",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
-        miss=f"{lost} of {theirs.size:,} walls are stable only without impulses ({there or 'none'} at the paper's "
-             f"damping), {int((ours & ~theirs).sum())} only with them" if lost else "")
+        miss=f"of {theirs.size:,} walls (pairs of stiffness and damping) {lost} are stable only without impulses "
+             f"({there or 'none'} at the paper's damping), {int((ours & ~theirs).sum())} only with them"
+        if lost else "")
 
 
 def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
@@ -111,8 +112,8 @@ def _hard(table: Table) -> Part:
         for key in ("rate-hardness", "penetration")
     )
     return Part.of(
-        f"Rate-hardness and penetration with impulses, relative to springs alone, at the paper's wall damping of "
-        f"{PAPER_DAMPING:g} N s/m",
+        "First rise of the force (rate-hardness) and penetration with impulses, relative to penalties, at the paper's "
+        f"wall damping of {PAPER_DAMPING:g} N s/m",
         f"{min(harder):.3g} to {max(harder):.3g} times as hard (median over stiffnesses), {min(deeper):.2f} to "
         f"{max(deeper):.2f} times as deep", "harder, no deeper",
         REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)
