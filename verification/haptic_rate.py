@@ -56,7 +56,8 @@ RATE = Check(
     cases=lambda study: list(_rates(study.table(C19))), timed=tuple(_MOST.values()),
     note="The largest tried number of contacts with which 999 of 1000 impacts end within 1 ms, on this machine.",
 )  # fmt: skip
-KERNELS = replace(C22, key="compiled, IAPB and Lemke", says=_kernels_say)
+KERNELS = replace(C22, key="compiled, IAPB and Lemke", says=_kernels_say, note="Ratio: Lemke's time over IAPB's; a row "
+                  "holds if Lemke's method takes clearly longer.")
 SOLVERS = replace(IMPACT_TIMES, key="solvers", says=solvers_say)
 # key of a check -> finding and table from which a report takes its rows
 QUOTED = {RATE.key: ("C19", "C19"), KERNELS.key: ("C22", "C22"), SOLVERS.key: ("complementarity", IMPACT_TIMES.key)}

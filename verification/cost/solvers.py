@@ -149,5 +149,6 @@ IMPACT_TIMES = Check(
     cases=lambda _: [Size(family, contacts) for contacts in CONTACTS for family in FAMILIES],
     note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. The two kernels are called "
     "from compiled code, all others from Python. The common interface of the solvers checks arguments and results and "
-    "forms W, which takes about 0.3 ms even for one contact; “direct call” is DAQP without this interface.",
+    "forms W, which takes about 0.3 ms even for one contact; “direct call” is DAQP without this interface. "
+    "Distance of v⁺: from IAPB's for ours and the printed formula, from DAQP's for the others.",
 )  # fmt: skip

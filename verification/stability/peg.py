@@ -36,7 +36,7 @@ def _contacts(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str
         yield {
             "device": device, "stiffness [N/m]": K, "damping [N s/m]": B, "world": run.world,
             "settles after [s]": settling_time(trace) if run.complete else None, "bounces": bounces(trace),
-            "penetration [mm]": 1e3 * deepest_penetration(trace), "stopped": run.stopped,
+            "penetration [mm]": 1e3 * deepest_penetration(trace), "run stopped because": run.stopped,
         }
 
 
