@@ -128,7 +128,7 @@ def test_a_scene_that_drifts_while_it_is_timed_is_not_called_at_rest() -> None:
 def test_piles_on_which_the_printed_formula_is_faster_are_named() -> None:
     rows = [{"impacts": "pile", "contacts": c, "solver": name, "outcome": "solved", "median [µs]": t, "least [µs]": t,
              "largest [µs]": t} for c in (4, 64, 300) for name, t in ((IAPB, 1.0 * c), (PRINTED, 80.0))]  # fmt: skip
-    assert printed_faster(IMPACT_TIMES.table_of(rows)).startswith("On piles of 300 contacts")
+    assert printed_faster(IMPACT_TIMES.table_of(rows)).startswith("On piles of 300 independent contacts")
     assert "up to 3.8 times" in printed_faster(IMPACT_TIMES.table_of(rows)) and not printed_faster(_costs((IAPB, 1.0)))
 
 
