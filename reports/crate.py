@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from reports.pages.records import StoredFile
 from reports.store.io import write_whole
+from reports.uses import StoredFile
 
 CRATE_NAME = "ro-crate-metadata.json"
 PROFILE = "https://w3id.org/ro/crate/1.1"

@@ -39,12 +39,12 @@ class ReportNumbers:
     depth: str
 
 
-def collect_numbers(evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> ReportNumbers:
+def collect_numbers(evidence: Evidence, figures: Iterable[Figure], depth: str) -> ReportNumbers:
     """Return every table and judged sentence of a report, each once, and the content hashes of its runs."""
     tables = dict(_of_evidence(evidence))
-    for key, figure in figures.items():
+    for figure in figures:
         if figure.numbers is not None and all(figure.numbers is not table for table in tables.values()):
-            tables[f"figures/{key}"] = figure.numbers
+            tables[f"figures/{figure.key}"] = figure.numbers
     runs = {entry.command: entry.content_hash for entry in evidence.manifest if entry.used_by}
     return ReportNumbers(tables, runs, dict(evidence.provenance), depth)
 

@@ -1,6 +1,7 @@
 """Write the report: a first page, a page for each section, an archive of all pages, and the files beside them.
 
-    pages = build_report(Evidence(inputs=..., claims=..., ...))
+    evidence = Evidence(inputs=..., claims=..., ...)
+    pages = build_report(evidence, draw_all(evidence))
     write_report("out", pages)
 
 A report whose sources, results and files have not changed is not made again: its answer is kept beside its tables.
@@ -13,15 +14,13 @@ import json
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from iapb.errors import ArgumentError
 from reports.crate import write_crate
 from reports.evidence.depends import FOLDERS, PACKAGES, depends_of, folder_hash
-from reports.figures.figure import Figure, Recipe
+from reports.figures.figure import Figure
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.builder import FIRST_PAGE
 from reports.pages.records import Evidence
@@ -29,7 +28,6 @@ from reports.pages.sections import SECTIONS
 from reports.provenance import PEERS, collect_provenance, uncommitted_changes
 from reports.store.io import write_whole
 from reports.store.keys import evidence_version, hash_of, plain, sources_hash
-from verification.finding import Failure, attempt
 
 LARGEST_FIRST, LARGEST_ARCHIVE = 1_000_000, 4_000_000  # bytes: a report that cannot be mailed is not read
 ARCHIVE_NAME, DIRTY_NAME = "report.zip", "dirty.diff"
@@ -65,26 +63,7 @@ def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
     return Path(folder) / FIRST_PAGE
 
 
-def remembering(
-    recipes: tuple[Recipe, ...], failures: list[Failure] | None = None
-) -> tuple[tuple[Recipe, ...], dict[str, Figure]]:
-    """Return the recipes, and a mapping that receives each drawn figure by its key.
-
-    A figure that raises is appended to `failures`, and the page says that it was not computed.
-    """
-    drawn: dict[str, Figure] = {}
-    failed: list[Failure] = [] if failures is None else failures
-
-    def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure:
-        figure = attempt(recipe.key, partial(recipe.draw, inputs), failed)
-        if figure is not None and figure.panels:
-            drawn[recipe.key] = figure
-        return Figure(recipe.key, recipe.number, recipe.title) if figure is None else figure
-
-    return tuple(replace(recipe, draw=partial(draw, recipe)) for recipe in recipes), drawn
-
-
-def write_companions(out: Path, evidence: Evidence, figures: Mapping[str, Figure], depth: str) -> tuple[Path, ...]:
+def write_companions(out: Path, evidence: Evidence, figures: Iterable[Figure], depth: str) -> tuple[Path, ...]:
     """Write the numbers, the uncommitted changes if there are any, and last the RO-Crate metadata; return the files."""
     written, changed = [write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))], out / DIRTY_NAME
     changed.unlink(missing_ok=True)

@@ -19,10 +19,9 @@ from reports.store.folder import Place, RunStore
 from reports.store.io import mark_store
 from reports.store.runs import RunEntry, read_provenance
 from reports.streaming import Stream
-from reports.uses import UsedRun, run_command
+from reports.uses import StoredFile, run_command
 
 Progress = Callable[[int, int], None]
-Fetched = tuple[Run, RunEntry]
 
 
 class Runner:
@@ -37,11 +36,11 @@ class Runner:
     def __init__(self, folder: Path | str, progress: Progress | None = None) -> None:
         self.store = RunStore(folder)
         self.progress = progress
-        self.used: dict[str, UsedRun] = {}  # by file name, in the order of use
+        self.used: dict[str, StoredFile] = {}  # by file name, in the order of use
         self.files: set[str] = set()  # of all runs used so far, inside and outside of an open `recording`
         self.user = ""  # the user recorded for the runs requested now
-        self._held: dict[str, Fetched] = {}
-        self._known: dict[str, UsedRun] = {}
+        self._held: dict[str, tuple[Run, RunEntry]] = {}
+        self._known: dict[str, StoredFile] = {}
         self._made_here: set[str] = set()
         self._places: dict[tuple[int, str, str], tuple[Place, Scene]] = {}
 
@@ -53,27 +52,21 @@ class Runner:
         An incomplete run is stored as partial. Then the error that stopped it is raised; with `partial` the run is
         returned instead.
         """
-        run, entry = self.fetch(scene, world, rendering, keep=keep)
+        place = self._place(scene, world, rendering)
+        name = place.path.name
+        if not place.path.is_file():
+            self._made_here.add(name)
+        found = find_world(world, rendering)
+        compute = given(one_thread()(simulate), scene, found.law, found.coupling_in(scene),
+                        world=_label(world, rendering), progress=self.progress)
+        run, entry = self._held.get(name) or self.store.fetch(place, compute)
+        if keep and run.complete:
+            self._held[name] = run, entry
         if not partial:
             require_complete(run)
         self._know(entry, scene, world, rendering)
         self.use_again(scene, world, rendering)
         return run
-
-    def fetch(self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True) -> Fetched:
-        """Return the run of `scene` in `world` and the entry of its file, even if the simulation gave up."""
-        place = self._place(scene, world, rendering)
-        if place.path.name in self._held:
-            return self._held[place.path.name]
-        if not place.path.is_file():
-            self._made_here.add(place.path.name)
-        found = find_world(world, rendering)
-        compute = given(one_thread()(simulate), scene, found.law, found.coupling_in(scene),
-                        world=_label(world, rendering), progress=self.progress)
-        fetched = self.store.fetch(place, compute)
-        if keep and fetched[0].complete:
-            self._held[place.path.name] = fetched
-        return fetched
 
     def stream(self, scene: Scene, world: str, rendering: str = "full", *, resume: bool = False) -> tuple[Place, Any]:
         """Simulate and store a run in constant memory; return its place and the outcome, None if the run exists.
@@ -91,13 +84,13 @@ class Runner:
             return place, streamed.run(resume, self.progress)
 
     @contextmanager
-    def recording(self, user: str) -> Iterator[dict[str, UsedRun]]:
+    def recording(self, user: str) -> Iterator[dict[str, StoredFile]]:
         """Yield a mapping that collects the runs used inside this context as used by `user`.
 
         The runs also count as used outside of it.
         """
         outside, user_outside = self.used, self.user
-        inside: dict[str, UsedRun] = {}
+        inside: dict[str, StoredFile] = {}
         self.used, self.user = inside, user
         try:
             yield inside
@@ -106,7 +99,7 @@ class Runner:
             for run in inside.values():
                 self.use(run)
 
-    def use(self, run: UsedRun) -> None:
+    def use(self, run: StoredFile) -> None:
         """Record a run as used; its earlier users are kept."""
         before = self.used[run.file].used_by if run.file in self.used else ()
         self.used[run.file] = replace(run, used_by=tuple(dict.fromkeys(before + run.used_by)))
@@ -135,9 +128,9 @@ class Runner:
             command = run_command(scene, world, rendering) or f"iapb store again out/runs/{entry.file}"
             path = self.store.folder / entry.file
             machine = this_machine() if name in self._made_here else machine_of(read_provenance(path))
-            self._known[name] = UsedRun(self.label(scene, world, rendering), entry.file, entry.run_key,
-                                        entry.content_hash, command, path.stat().st_size, entry.status,
-                                        made_on=machine)  # fmt: skip
+            self._known[name] = StoredFile(self.label(scene, world, rendering), entry.file, entry.run_key,
+                                           entry.content_hash, command, path.stat().st_size, status=entry.status,
+                                           made_on=machine)  # fmt: skip
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:

@@ -1,4 +1,4 @@
-"""Keep track of which runs a result was made from, and of the command that reproduces each run."""
+"""The files that a result was made from, and the command that reproduces each run."""
 
 from __future__ import annotations
 
@@ -15,21 +15,19 @@ from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.scene.document import Document
 from iapb.scene.model import set_value
 
-COMPLETE, PARTIAL = "complete", "partial"
-
 
 @dataclass(frozen=True)
-class UsedRun:
-    """A run file that was read or written for a result.
+class StoredFile:
+    """A run or table file that was read or written for a result; a line of the report's manifest.
 
-    name : scene, world and rendering
-    file : name within the folder of runs
-    key, content_hash : hash of the run's inputs, and hash of its results
-    command : reproduces the run
+    name : of a run: scene, world and rendering
+    file : name within the folder of runs; in the manifest, the path from the folder of the report
+    key, content_hash : hash of what determines the content, and hash of the content
+    command : reproduces the file
     size : size of the file [bytes]
-    status : COMPLETE, or PARTIAL if the simulation gave up
-    used_by : the claims, topics and figure inputs that used the run
-    made_on : processor, BLAS kernel and optional numpy code of the computation
+    used_by : the claims, topics and figure inputs that used a run; empty for a table
+    status : "complete", "partial" if the simulation gave up, "absent" if the file was removed later
+    made_on : processor, BLAS kernel and optional numpy code of the computation, if the file states them
     """
 
     name: str
@@ -37,9 +35,9 @@ class UsedRun:
     key: str
     content_hash: str
     command: str
-    size: int
-    status: str = COMPLETE
+    size: int = 0
     used_by: tuple[str, ...] = ()
+    status: str = "complete"
     made_on: str = ""
 
 

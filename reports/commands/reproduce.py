@@ -17,15 +17,15 @@ from iapb.names import one_of
 from reports.commands.report import difference_lines
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, unlike
 from reports.evidence.gather import failed_cases, gather
-from reports.evidence.runs import FIGURE_RUNS, TILTED, shipped_scene, tilted_runs
+from reports.evidence.runs import FIGURE_RUNS, TILTED, figure_run, shipped_scene, tilted_runs
 from reports.figures import RECIPES
 from reports.figures.figure import draw, standalone
 from reports.numbers_file import read_numbers
-from reports.pages.builder import build_report, figure_inputs
+from reports.pages.builder import build_report, draw_all, figure_inputs
 from reports.pages.first import count_claims
 from reports.pages.quantities import contradictions, unsaid
 from reports.pages.records import FailedCases
-from reports.report import keep_answer, kept_answer, remembering, report_key, write_companions, write_report
+from reports.report import keep_answer, kept_answer, report_key, write_companions, write_report
 from reports.runner import Runner
 from reports.show import Answer, Json, counted, stage_progress
 from reports.store.io import write_whole
@@ -66,8 +66,8 @@ def make_report(out: Path, depth: str) -> Answer:
         evidence = gather(out, depth, progress)
     gathered = time.perf_counter()
     undrawn: list[Failure] = []
-    recipes, figures = remembering(RECIPES, undrawn)
-    path = write_report(out, build_report(evidence, recipes))
+    figures = draw_all(evidence, RECIPES, undrawn)
+    path = write_report(out, build_report(evidence, figures))
     failed = evidence.failed + failed_cases(out / "tables", {"figures": undrawn})
     beside = write_companions(out, evidence, figures, depth)
     ended, files = time.perf_counter(), len(evidence.manifest)
@@ -164,8 +164,7 @@ def _inputs(needs: tuple[str, ...], out: Path, depth: str,
     runner, found = Runner(out / "runs"), dict[str, Any]()
     for done, name in enumerate(needs, 1):
         if name in FIGURE_RUNS:
-            scene, values, world, rendering = FIGURE_RUNS[name]
-            found[name] = runner(shipped_scene(scene, values), world, rendering)
+            found[name] = figure_run(runner, name)
         elif name == TILTED:
             found[name] = tilted_runs(runner)
         else:

@@ -16,19 +16,7 @@ from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
 from reports.resimulate import recover, repeat_run
 from reports.show import Answer, Json, one_line, said, stage_progress
-from reports.store.care import (
-    DAMAGED,
-    FOREIGN,
-    OTHER,
-    WHOLE,
-    FileState,
-    check_store,
-    collect_garbage,
-    garbage,
-    is_run,
-    parts_of_killed,
-    repair_store,
-)
+from reports.store import care
 from reports.store.parts import are_damaged, remove_parts
 from reports.store.runs import read_provenance
 
@@ -68,25 +56,26 @@ def store(
     return _again(where) if action is Action.again else _checked(where, action is Action.repair)
 
 
-def _listed(states: Sequence[FileState]) -> list[str]:
-    return [f"{one_line(state.path)}: {state.state}: {state.why}" for state in states if state.state != WHOLE]
+def _listed(states: Sequence[care.FileState]) -> list[str]:
+    return [f"{one_line(state.path)}: {state.state}: {state.why}" for state in states if state.state != care.WHOLE]
 
 
 def _checked(where: Path, repair: bool) -> Answer:
     with stage_progress() as progress:
-        states = (repair_store if repair else check_store)(where, partial(progress, "files read whole"))
+        states = (care.repair_store if repair else care.check_store)(where, partial(progress, "files read whole"))
     count = Counter(state.state for state in states)
     facts = {"files": states, "count": count}
     parts = ", ".join(f"{number} {state}" for state, number in count.most_common())
     lines = [*_listed(states), f"{len(states)} files: {parts or 'none'}"]
     if repair:
-        logs = [line for parts in parts_of_killed(where) for line in _recovered(parts)]
-        aside = sum(state.state == DAMAGED and not state.path.exists() for state in states)
+        logs = [line for parts in care.parts_of_killed(where) for line in _recovered(parts)]
+        aside = sum(state.state == care.DAMAGED and not state.path.exists() for state in states)
         lines += [*logs, f"{aside} damaged set aside, to be computed again when next asked for."]
         return Answer(facts | {"logs": logs, "aside": aside}, lines)
-    if count[DAMAGED]:
+    if count[care.DAMAGED]:
         lines.append(f"iapb store repair {where} sets aside damaged files whose seal holds; remove the others.")
-    return Answer(facts, lines, int(bool(count[DAMAGED] or where.is_file() and count[FOREIGN] + count[OTHER])))
+    failed = count[care.DAMAGED] or where.is_file() and count[care.FOREIGN] + count[care.OTHER]
+    return Answer(facts, lines, int(bool(failed)))
 
 
 def _recovered(parts: Path) -> Iterator[str]:
@@ -105,10 +94,10 @@ def _recovered(parts: Path) -> Iterator[str]:
 
 
 def _gc(where: Path, delete: bool) -> Answer:
-    found = garbage(where)
+    found = care.garbage(where)
     size = sum(state.size for state in found) / 1e6
     if delete:
-        collect_garbage(found)
+        care.collect_garbage(found)
     return Answer({"files": found, "megabytes": size, "removed": delete}, [
         *_listed(found),
         f"{len(found)} files, {size:.1f} MB, {'removed' if delete else 'would be removed by --delete'}; results of the "
@@ -117,7 +106,7 @@ def _gc(where: Path, delete: bool) -> Answer:
 
 def _again(where: Path) -> Answer:
     """Simulate the runs again; list what differs, and by how much."""
-    files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
+    files = [path for path in sorted(where.rglob("*.h5")) if care.is_run(path)] if where.is_dir() else [where]
     facts, lines = dict[Path, dict[str, object]](), list[str]()
     with stage_progress() as progress:
         for done, path in enumerate(files):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
@@ -18,12 +19,12 @@ from reports.evidence.depends import depends_of
 from reports.evidence.stage import Stage
 from reports.evidence.topics import AHEAD, CLAIM_STAGES, TOPICS, failed_topic, plans
 from reports.figures.paper import arm_energies
-from reports.pages.records import Evidence, FailedCases, StoredFile
+from reports.pages.records import Evidence, FailedCases
 from reports.provenance import PEERS, collect_provenance, this_machine
 from reports.runner import Runner
 from reports.store.io import opened, write_whole
 from reports.store.keys import evidence_version
-from reports.uses import UsedRun
+from reports.uses import StoredFile
 from verification import haptic_rate
 from verification.check import Study
 from verification.claims import peg
@@ -179,11 +180,11 @@ def _tell(*said: Any) -> None:
     batches.tell_parent(said)
 
 
-def manifest(used: Mapping[str, UsedRun], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:
+def manifest(used: Mapping[str, StoredFile], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:
     """Return one line per used run file and per table file, in the order of use; paths are relative to `out`."""
-    files = [StoredFile(run.name, f"runs/{run.file}", run.key, run.content_hash, run.command, run.size,
-                        run.used_by or (UNNAMED,), run.status if (out / "runs" / run.file).is_file() else ABSENT,
-                        run.made_on) for run in used.values()]  # fmt: skip
+    files = [replace(run, file=f"runs/{run.file}", used_by=run.used_by or (UNNAMED,),
+                     status=run.status if (out / "runs" / run.file).is_file() else ABSENT)
+             for run in used.values()]  # fmt: skip
     for stage in stages:
         if stage.path.is_file():
             with opened(stage.path, expected_format=None) as file:

@@ -56,15 +56,17 @@ def figure_runs(
 ) -> dict[str, Run]:
     """Return every run in FIGURE_RUNS, computed or read; runs that fail are left out."""
     runs = {}
-    for name, (scene, values, world, rendering) in counted(FIGURE_RUNS.items(), progress):
+    for name in counted(FIGURE_RUNS, progress):
         with runner.recording(name):
-            run = attempt(name, partial(_run, runner, scene, values, world, rendering), failures)
+            run = attempt(name, partial(figure_run, runner, name), failures)
         if run is not None:
             runs[name] = run
     return runs
 
 
-def _run(runner: Runner, scene: str, values: dict[str, Any], world: str, rendering: str) -> Run:
+def figure_run(runner: Runner, name: str) -> Run:
+    """Return the run in FIGURE_RUNS with this name, computed or read."""
+    scene, values, world, rendering = FIGURE_RUNS[name]
     return runner(shipped_scene(scene, values), world, rendering)
 
 

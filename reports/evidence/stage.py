@@ -21,7 +21,7 @@ from reports.runner import Runner
 from reports.store.io import mark_store
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
 from reports.store.tables import read_record, write_record
-from reports.uses import UsedRun
+from reports.uses import StoredFile
 from verification.finding import Failure, attempt
 
 _LAYOUT = 4  # of the files: 3 did not say where runs were made
@@ -56,7 +56,7 @@ class Stage:
         self.name, self.kind = name, kind
         self.path = folder / f"{word}-{self.key[:16]}.h5"
         self.records: Any = None
-        self.runs: dict[str, UsedRun] = {}
+        self.runs: dict[str, StoredFile] = {}
         self.failures: list[Failure] = []
         self.seconds = 0.0
 
@@ -74,7 +74,7 @@ class Stage:
 
     def _read(self) -> None:
         content = read_record(self.path)
-        self.runs = {run["file"]: UsedRun(**run | {"used_by": tuple(run["used_by"])}) for run in content["runs"]}
+        self.runs = {run["file"]: StoredFile(**run | {"used_by": tuple(run["used_by"])}) for run in content["runs"]}
         self.records = self._checked(content["records"])
 
     def _compute(self, runner: Runner, compute: Callable[[list[Failure]], Any]) -> None:

@@ -11,12 +11,14 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
 from markupsafe import Markup, escape
 
 from reports.figures.style import INK, MUTED, PAPER, LineStyle, css
+from verification.finding import Failure, attempt
 from verification.table import Table
 
 Legend = Mapping[str, LineStyle] | Iterable[tuple[str, LineStyle]]
@@ -76,6 +78,7 @@ class Figure:
 
     inputs : names of the runs and tables it was drawn from; missing : those that it lacks, so that it has no panels
     said : what the paper says, what we find, what is the same, what differs; claims : the claims that it shows
+    section : the section of the report that has it
     """
 
     key: str
@@ -89,6 +92,7 @@ class Figure:
     missing: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
     claims: tuple[str, ...] = ()
+    section: str = "figures"
 
 
 @dataclass(frozen=True)
@@ -113,7 +117,7 @@ MADE: dict[str, Recipe] = {}
 def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
     """Make the recipe `key` of figures.toml from the decorated function, which gets one argument per input."""
     text = TEXTS[key]
-    number, title = text.get("number", ""), text["title"]
+    number, title, section = text.get("number", ""), text["title"], text.get("section", "figures")
 
     def made(function: Callable[..., Drawn]) -> Recipe:
         def draw(inputs: Mapping[str, Any]) -> Figure:
@@ -121,18 +125,22 @@ def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
             caption, *said = (" ".join(words.split()).format(**drawn.told)
                               for words in (text.get("caption", ""), *text.get("said", ())))
             return Figure(key, number, title, caption, tuple(drawn.panels), drawn.numbers,
-                          tuple(dict(drawn.legend).items()), needs, said=tuple(said), claims=text.get("claims", ()))
+                          tuple(dict(drawn.legend).items()), needs, (), tuple(said), text.get("claims", ()), section)
 
-        MADE[key] = Recipe(key, number, title, needs, draw, text.get("section", "figures"))
+        MADE[key] = Recipe(key, number, title, needs, draw, section)
         return MADE[key]
 
     return made
 
 
-def draw(recipe: Recipe, inputs: Mapping[str, Any]) -> Figure:
-    """Draw one figure, or return one without panels that says which of its inputs are missing."""
+def draw(recipe: Recipe, inputs: Mapping[str, Any], failures: list[Failure] | None = None) -> Figure:
+    """Draw one figure; it has no panels if inputs are missing, which it names, or if it raises, which `failures` notes.
+
+    If `failures` is None, an exception propagates.
+    """
     missing = tuple(name for name in recipe.needs if inputs.get(name) is None)
-    return Figure(recipe.key, recipe.number, recipe.title, missing=missing) if missing else recipe.draw(inputs)
+    drawn = None if missing else attempt(recipe.key, partial(recipe.draw, inputs), failures)
+    return drawn or Figure(recipe.key, recipe.number, recipe.title, missing=missing, section=recipe.section)
 
 
 # A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of the page's variables

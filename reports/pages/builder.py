@@ -35,6 +35,7 @@ from verification.finding import (
     REPRODUCED,
     VERDICTS,
     WORST_FIRST,
+    Failure,
     Finding,
     Part,
 )
@@ -55,16 +56,22 @@ OUTCOME_CLASSES = dict(zip(OUTCOMES, (
 FINDINGS = IN_WORDS | {MIXED: "mixed"}  # the words for the verdicts of a check that is not a claim of the paper
 
 
-def build_report(evidence: Evidence, recipes: Sequence[Recipe] = RECIPES) -> dict[str, str]:
+def draw_all(evidence: Evidence, recipes: Iterable[Recipe] = RECIPES, failures: list[Failure] | None = None
+             ) -> list[Figure]:  # fmt: skip
+    """Draw the figures of a report; see `draw` for those that cannot be drawn."""
+    inputs = figure_inputs(evidence)
+    return [draw(recipe, inputs, failures) for recipe in recipes]
+
+
+def build_report(evidence: Evidence, drawn: Iterable[Figure] = ()) -> dict[str, str]:
     """Return the HTML of the first page and of each section by file name, FIRST_PAGE first.
 
     Missing evidence is printed as "not computed in this run". Every page links to the others and needs neither network
     nor script.
     """
-    inputs = figure_inputs(evidence)
     figures: dict[str, list[Figure]] = {}
-    for recipe in recipes:
-        figures.setdefault(recipe.section, []).append(draw(recipe, inputs))
+    for figure in drawn:
+        figures.setdefault(figure.section, []).append(figure)
     environment = _environment()
     text = "(() => {\n\"use strict\";\n" + files(__package__).joinpath("scripts/page.js").read_text("utf-8") + "})();\n"
     digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

@@ -11,29 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from reports.uses import StoredFile
 from verification.finding import Failure, Finding
 from verification.proofs.show import ProofRecord
 from verification.table import Table
-
-
-@dataclass(frozen=True)
-class StoredFile:
-    """One line of the manifest: a run or table file, its content, and the command that reproduces it.
-
-    used_by : the claims, figure inputs and topics that use a run; empty for a table
-    status : "complete", "partial" if the simulation gave up, "absent" if the file was removed later
-    made_on : processor, BLAS kernel and optional numpy code of the computation, if the file states them
-    """
-
-    name: str
-    file: str
-    key: str
-    content_hash: str
-    command: str
-    size: int = 0  # bytes
-    used_by: tuple[str, ...] = ()
-    status: str = "complete"
-    made_on: str = ""
 
 
 def anchor(user: str) -> str:

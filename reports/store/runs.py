@@ -16,18 +16,7 @@ from iapb.run import ContactTable, EffectRow, ImpactTable, Run, coordinates_of, 
 from iapb.schema import Quantity
 from reference.hdf5 import Budget
 from reports.provenance import collect_provenance
-from reports.store.io import (
-    blocks,
-    dataset_of,
-    extend,
-    group_of,
-    new_file,
-    opened,
-    read_values,
-    write_quantity,
-    write_scale,
-    write_text,
-)
+from reports.store import io
 from reports.store.keys import content_hash, plain
 from reports.store.schema import (
     FORMAT,
@@ -83,7 +72,7 @@ def store_run(
     says why it is incomplete.
     """
     path, large = Path(path), not isinstance(run, Run)
-    with new_file(path, replace=replace, large=large) as file:
+    with io.new_file(path, replace=replace, large=large) as file:
         if isinstance(run, Run):
             _write_run(file, run, key, code, provenance)
             file.attrs["content_hash"] = content_hash(run)
@@ -97,7 +86,7 @@ def store_run(
                     _append(file, piece)
             file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
                                "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
-            file.attrs["content_hash"] = content_hash(_run_in(file, path, dataset_of))
+            file.attrs["content_hash"] = content_hash(_run_in(file, path, io.dataset_of))
         return _entry(file, path)
 
 
@@ -122,35 +111,35 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
         value = getattr(run, attribute)
         if attribute in JSON_TEXTS:
             value = json.dumps(plain(value), ensure_ascii=False, indent=1)
-        write_text(file.require_group(group), name, value)
+        io.write_text(file.require_group(group), name, value)
     names = file.create_group("mechanism")
     for dimension in ("coordinate", "velocity", "body"):
-        scale = write_scale(names, dimension, getattr(run, f"{dimension}_names"), "1")
+        scale = io.write_scale(names, dimension, getattr(run, f"{dimension}_names"), "1")
         if dimension != "body":
             units = getattr(run, f"{dimension}_units")
-            write_quantity(names, f"{dimension}_unit", units, [scale], "1", f"unit of each {dimension}")
+            io.write_quantity(names, f"{dimension}_unit", units, [scale], "1", f"unit of each {dimension}")
     for name in (*GROUPS, "energy", "effects", "provenance"):
         file.create_group(name, track_order=name in ("energy", "provenance"))
     groups, scales = {name: file[name] for name in file}, dict[tuple[str, str], Any]()  # a look-up takes 0.1 ms
     for group, quantity, values in _columns(run):
         for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
             if (group, dimension) not in scales:
-                scales[group, dimension] = write_scale(
+                scales[group, dimension] = io.write_scale(
                     groups[group], dimension, *coordinates_of(run, dimension, length), growing=growing)
-        dataset = write_quantity(groups[group], quantity.name, values, [scales[group, name] for name in
-                                 quantity.dimensions], unit_of(quantity, run), quantity.meaning,
-                                 growing=growing)  # fmt: skip
+        along = [scales[group, name] for name in quantity.dimensions]
+        dataset = io.write_quantity(groups[group], quantity.name, values, along, unit_of(quantity, run),
+                                    quantity.meaning, growing=growing)  # fmt: skip
         if quantity.name == "state":
             dataset.attrs.update(STATE_ATTRIBUTES)
     effects = file["effects"]
-    scale = write_scale(effects, "effect", tuple(effect.name for effect in run.effects), "1")
+    scale = io.write_scale(effects, "effect", tuple(effect.name for effect in run.effects), "1")
     active = np.array([effect.active for effect in run.effects], np.int8)
-    write_quantity(effects, "active", active, [scale], "1", "1 where the effect was on")
+    io.write_quantity(effects, "active", active, [scale], "1", "1 where the effect was on")
     for name, meaning in (("reason", "why"), ("ignores", "field of the scene that the law ignored, or empty")):
         texts = tuple(getattr(effect, name) for effect in run.effects)
-        write_quantity(effects, name, texts, [scale], "1", meaning)
+        io.write_quantity(effects, name, texts, [scale], "1", meaning)
     for name, text in (collect_provenance() if provenance is None else provenance).items():
-        write_text(file["provenance"], name, text)
+        io.write_text(file["provenance"], name, text)
 
 
 def _append(file: Any, part: Run) -> None:
@@ -159,10 +148,10 @@ def _append(file: Any, part: Run) -> None:
         along, dataset = quantity.dimensions[0], file[group][quantity.name]
         if along == "step_edge":
             values = values + dataset[-1]
-        extend(dataset, values[int(along in ("time", "step_edge")):])
+        io.extend(dataset, values[int(along in ("time", "step_edge")):])
         scale = file[group][along]
         if len(scale) < len(dataset):
-            extend(scale, part.time[1:] if along == "time" else np.arange(len(scale), len(dataset)))
+            io.extend(scale, part.time[1:] if along == "time" else np.arange(len(scale), len(dataset)))
 
 
 def read_run(path: Path | str, budget: int | None = None) -> Run:
@@ -180,19 +169,19 @@ def read_run(path: Path | str, budget: int | None = None) -> Run:
 
 def read_stored(path: Path | str, budget: int | None = None) -> tuple[Run, RunEntry]:
     """Return the run in a file and the entry of the file; it raises the errors of `read_run`."""
-    with opened_run(path, read_values, budget) as found:
+    with opened_run(path, io.read_values, budget) as found:
         return found
 
 
 @contextmanager
 def opened_run(
-    path: Path | str, read: Reader = dataset_of, budget: int | None = None,
+    path: Path | str, read: Reader = io.dataset_of, budget: int | None = None,
 ) -> Iterator[tuple[Run, RunEntry]]:
     """Yield a run whose arrays stay in its file, to be read in `blocks`, and the entry of the file.
 
     The file is checked completely, in constant memory.
     """
-    with opened(path) as file:
+    with io.opened(path) as file:
         run, entry = _run_in(file, path, read, budget), _entry(file, path)
         _check(run)
         if content_hash(run) != entry.content_hash:
@@ -208,10 +197,10 @@ def read_provenance(path: Path | str) -> dict[str, str]:
     RunFileError
         The file is damaged, or an entry is not a text.
     """
-    with opened(path, expected_format=None) as file:
-        group = group_of(file, "provenance", path)
+    with io.opened(path, expected_format=None) as file:
+        group = io.group_of(file, "provenance", path)
         budget = Budget(path, file)
-        found = {name: read_values(group, name, budget) for name in group}
+        found = {name: io.read_values(group, name, budget) for name in group}
     for name, text in found.items():
         if not isinstance(text, str):
             raise RunFileError(f"{path}: provenance/{name} is no text")
@@ -226,7 +215,7 @@ def read_entry(path: Path | str) -> RunEntry:
     RunFileError
         The file is absent, damaged or not a run, or its entry is incomplete.
     """
-    with opened(path) as file:
+    with io.opened(path) as file:
         return _entry(file, path)
 
 
@@ -249,7 +238,7 @@ def _check(run: Run) -> None:
     for name, values, most in (("contacts/offsets", run.contacts.offsets, lengths["contact"]),
                                ("impacts/step", run.impacts.step, run.steps - 1)):
         last = 0
-        for block in blocks(values):
+        for block in io.blocks(values):
             line = np.concatenate(([last], block, [most]))
             if (wrong := np.flatnonzero(np.diff(line) < 0)).size:
                 raise ValueError(f"{name} holds {line[wrong[0] + 1]} after {line[wrong[0]]}: expected numbers that "
@@ -265,21 +254,21 @@ def _check(run: Run) -> None:
 def _run_in(file: Any, path: Path | str, read: Reader, budget: int | None = None) -> Run:
     """Return the run in an open file; `read` is `read_values` (arrays in memory) or `dataset_of` (on disk)."""
     place = Budget(path, file, budget)
-    texts = {attribute: read_values(file[group], name, place) for group, name, attribute in TEXTS}
+    texts = {attribute: io.read_values(file[group], name, place) for group, name, attribute in TEXTS}
     tables = {group: {quantity.name: _numbers(read, file[group], quantity, place) for quantity in listed}
               for group, (listed, _) in GROUPS.items()}  # fmt: skip
-    energy, effects, names = group_of(file, "energy", path), file["effects"], file["mechanism"]
-    lists = [read_values(effects, name, place) for name in ("effect", "active", "reason", "ignores")]
+    energy, effects, names = io.group_of(file, "energy", path), file["effects"], file["mechanism"]
+    lists = [io.read_values(effects, name, place) for name in ("effect", "active", "reason", "ignores")]
     parts: dict[str, Any] = texts | {attribute: json.loads(texts[attribute]) for attribute in JSON_TEXTS}
     parts |= {name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES}
     for name in ("tool_dofs", "tool_coordinates"):
         start, stop = file.attrs[name]
         parts[name] = index(start), index(stop)
     for name in ("coordinate", "velocity"):
-        parts[f"{name}_names"] = read_values(names, name, place)
-        parts[f"{name}_units"] = read_values(names, f"{name}_unit", place)
+        parts[f"{name}_names"] = io.read_values(names, name, place)
+        parts[f"{name}_units"] = io.read_values(names, f"{name}_unit", place)
     return Run(
-        **parts, body_names=read_values(names, "body", place),
+        **parts, body_names=io.read_values(names, "body", place),
         **tables["trajectory"], **tables["steps"], **tables["timings"],
         dt=float(file.attrs["dt"]), complete=file.attrs["status"] == "complete",
         stopped=str(file.attrs.get("stopped", "")), time=_numbers(read, file["trajectory"], TIME, place),

@@ -19,16 +19,7 @@ from iapb.errors import RunFileError
 from iapb.names import one_of
 from reference.hdf5 import Budget
 from reports.provenance import collect_provenance
-from reports.store.io import (
-    extend,
-    group_of,
-    new_file,
-    opened,
-    read_values,
-    write_quantity,
-    write_scale,
-    write_text,
-)
+from reports.store import io
 from reports.store.keys import hash_of, plain
 from reports.store.schema import FORMAT_VERSION, TABLE_FORMAT
 from verification.table import Column, Table
@@ -42,7 +33,7 @@ def write_table(path: Path | str, name: str, table: Table, *, title: str = "", c
     A column of numbers and None becomes an array with NaN, any other one texts.
     """
     path = Path(path)
-    with new_file(path, replace=True) as file:
+    with io.new_file(path, replace=True) as file:
         write_head(file, collect_provenance())
         group = file.create_group(name, track_order=True)
         group.attrs.update({"title": title, "command": command})
@@ -62,19 +53,19 @@ def write_head(file: Any, provenance: Mapping[str, str]) -> None:
     """Write what every file of tables begins with."""
     file.attrs.update({"format": TABLE_FORMAT, "format_version": FORMAT_VERSION})
     for name, text in provenance.items():
-        write_text(file.require_group("provenance"), name, text)
+        io.write_text(file.require_group("provenance"), name, text)
 
 
 def append_columns(group: Any, columns: Iterable[tuple[str, str, str, Any]]) -> None:
     """Append rows, given as name, unit, meaning and values of each column; a new group gets the columns."""
     for name, unit, meaning, values in columns:
         if name in group:
-            extend(group[name], values)
+            io.extend(group[name], values)
         elif not len(group):
-            write_scale(group, name, values, unit, growing=True)
+            io.write_scale(group, name, values, unit, growing=True)
             group[name].attrs["long_name"] = meaning
         else:
-            write_quantity(group, name, values, [group[next(iter(group))]], unit, meaning, growing=True)
+            io.write_quantity(group, name, values, [group[next(iter(group))]], unit, meaning, growing=True)
 
 
 def read_columns(path: Path | str, name: str | None = None) -> dict[str, tuple[str, Any]]:
@@ -85,12 +76,12 @@ def read_columns(path: Path | str, name: str | None = None) -> dict[str, tuple[s
     RunFileError
         The file is absent, damaged or not a file of tables, or it has no such table.
     """
-    with opened(path, TABLE_FORMAT) as file:
+    with io.opened(path, TABLE_FORMAT) as file:
         tables = [each for each in file if each != "provenance"]
         if not tables or name not in (None, *tables):
             raise RunFileError(f"{path}: no table {name!r}: expected {one_of(str(name), tables)}")
-        group, budget = group_of(file, name or tables[0], path), Budget(path, file)
-        found = {key: (str(group[key].attrs["units"]), read_values(group, key, budget)) for key in group}
+        group, budget = io.group_of(file, name or tables[0], path), Budget(path, file)
+        found = {key: (str(group[key].attrs["units"]), io.read_values(group, key, budget)) for key in group}
         if len({len(values) for _, values in found.values()}) > 1:
             raise RunFileError(f"{path}: the columns of the table {group.name} have different lengths")
         return found
@@ -109,18 +100,18 @@ def write_record(
     provenance: Mapping[str, str] | None = None,
 ) -> Path:
     """Write any records as one text of JSON; see `plain` for the types, `runs` are the files behind the records."""
-    with new_file(path, replace=True) as file:
+    with io.new_file(path, replace=True) as file:
         write_head(file, collect_provenance() if provenance is None else provenance)
         group = file.create_group(RECORDS)
         group.attrs.update({"title": title, "command": command, "runs": "\n".join(runs)})
         text = json.dumps(plain(value), ensure_ascii=False)
-        write_text(group, "json", text)
+        io.write_text(group, "json", text)
         file.attrs["content_hash"] = hash_of(text)
     return path
 
 
 def read_record(path: Path) -> Any:
     """Return the records in a file as lists and mappings; it raises the errors of `read_columns`."""
-    with opened(path, TABLE_FORMAT) as file:
-        text = read_values(group_of(file, RECORDS, path), "json", Budget(path, file))
+    with io.opened(path, TABLE_FORMAT) as file:
+        text = io.read_values(io.group_of(file, RECORDS, path), "json", Budget(path, file))
         return json.loads(text if isinstance(text, str) else text[0])  # files of earlier versions have a list of one

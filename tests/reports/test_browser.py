@@ -18,7 +18,7 @@ from reports.figures.corner import UNLIMITED
 from reports.figures.film import SIZE, Film, bounds_of
 from reports.figures.geometry import outline
 from reports.figures.paper import arm_energies
-from reports.pages.builder import build_report
+from reports.pages.builder import build_report, draw_all
 from reports.pages.records import Evidence
 from reports.report import write_report
 from tests.reports.made_up import made_motion
@@ -120,7 +120,7 @@ def evidence():
 def first(evidence, tmp_path_factory):
     """The first page of the report of made-up records, with a few figures of each kind."""
     recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
-    return write_report(tmp_path_factory.mktemp("page"), build_report(evidence, recipes))
+    return write_report(tmp_path_factory.mktemp("page"), build_report(evidence, draw_all(evidence, recipes)))
 
 
 @pytest.fixture(scope="module")

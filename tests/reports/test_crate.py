@@ -15,11 +15,11 @@ from reports.crate import CRATE_NAME, PROFILE, sha256
 from reports.evidence import gather
 from reports.evidence.gather import ABSENT, manifest
 from reports.evidence.stage import Stage
-from reports.figures.figure import Figure, Panel, Recipe
+from reports.figures.figure import Figure, Panel
 from reports.numbers_file import NUMBERS_NAME, read_numbers
 from reports.pages.builder import FIRST_PAGE, build_report
 from reports.pages.records import Evidence
-from reports.report import DIRTY_NAME, remembering, write_companions, write_report
+from reports.report import DIRTY_NAME, write_companions, write_report
 from reports.runner import Runner
 from reports.store.io import MARK_NAME
 from verification.finding import REPRODUCED, Finding, Part, finding_of
@@ -27,7 +27,6 @@ from verification.table import titled
 
 PANEL = Panel("<svg viewBox='0 0 1 1'></svg>", "nothing")
 FIGURE = Figure("figA", "", "A", "See.", (PANEL,), titled(("x",), ((0.1,),)))
-RECIPE = Recipe("figA", "", "A", ("bulk",), lambda inputs: FIGURE)
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +49,8 @@ def out(tmp_path_factory):
         patch.setattr(report, "uncommitted_changes", lambda: "--- a/iapb/x.py\n+++ b/iapb/x.py")
         evidence = Evidence(inputs={"bulk": titled(("n",), ((3,),))}, claims=stage.records,
                             provenance=gather.provenance(), manifest=manifest(runner.used, [stage], folder))
-        recipes, figures = remembering((RECIPE,))
-        write_report(folder, build_report(evidence, recipes))
-        write_companions(folder, evidence, figures, "quick")
+        write_report(folder, build_report(evidence, [FIGURE]))
+        write_companions(folder, evidence, [FIGURE], "quick")
     return folder
 
 
@@ -135,7 +133,7 @@ def test_uncommitted_changes_are_a_patch_with_new_files_until_they_are_committed
     for name in ("notes.txt", FIRST_PAGE, DIRTY_NAME):
         (tmp_path / name).write_text("not a source")
     assert provenance.uncommitted_changes() == "" and provenance._dirty() == "false"
-    assert DIRTY_NAME not in [path.name for path in write_companions(tmp_path, Evidence(), {}, "quick")]
+    assert DIRTY_NAME not in [path.name for path in write_companions(tmp_path, Evidence(), (), "quick")]
     assert not (tmp_path / DIRTY_NAME).exists()
     (tmp_path / "iapb" / "old.py").write_text("a = 2\n")
     (tmp_path / "iapb" / "new.py").write_text("b = 3\n")

@@ -171,7 +171,7 @@ def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypa
     stage, again = (Stage(tmp_path / "tables", "engines", Finding, "quick") for _ in range(2))
     topic = gather._failed(gather._fill(stage, Runner(tmp_path / "runs"), "quick", nothing))
     assert topic.key == "engines" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
-    page = build_report(Evidence(topics=(topic,)), ())[FIRST_PAGE]
+    page = build_report(Evidence(topics=(topic,)))[FIRST_PAGE]
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert "Not computed, after RuntimeError: the disk went away." in first and "and more" not in first
     with pytest.raises(KeyboardInterrupt):

@@ -12,17 +12,25 @@ import pytest
 
 from iapb.errors import ArgumentError
 from reports import report
-from reports.figures import RECIPES
-from reports.figures.figure import Figure, Panel, Recipe, cell, grid
+from reports.figures.figure import Figure, Panel, cell, grid
 from reports.figures.paper import arm_energies
-from reports.pages.builder import FIRST_PAGE, ROWS_SHOWN, badge_words, build_report, link_across, worst_first
+from reports.pages.builder import (
+    FIRST_PAGE,
+    ROWS_SHOWN,
+    badge_words,
+    build_report,
+    draw_all,
+    link_across,
+    worst_first,
+)
 from reports.pages.first import LIMIT, facts, made_from
 from reports.pages.formulas import prose
 from reports.pages.quantities import contradictions, unsaid
-from reports.pages.records import Evidence, StoredFile
+from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import TERMS, explained, readable, terms_of
 from reports.report import ARCHIVE_NAME, LARGEST_FIRST, write_report
+from reports.uses import StoredFile
 from verification import finding
 from verification.claims import CLAIMS
 from verification.claims.conditions import FULL_GRID
@@ -64,9 +72,9 @@ class Outline(HTMLParser):
             self.wrong.append(tag)
 
 
-def joined(evidence, recipes=RECIPES):
+def joined(evidence):
     """Every page as one text, the first page first, for tests that ask what is said and not where."""
-    return "\n".join(build_report(evidence, recipes).values())
+    return "\n".join(build_report(evidence).values())
 
 
 def one(key, *parts, said="a", **more):
@@ -101,8 +109,8 @@ SKIPPED = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"
 
 @pytest.fixture(scope="module", params=[Evidence(), EVIDENCE], ids=["empty", "full"])
 def pages(request):
-    made = build_report(request.param)
-    assert made == build_report(request.param)  # byte for byte
+    made, again = (build_report(request.param, draw_all(request.param)) for _ in range(2))
+    assert made == again  # byte for byte
     return made
 
 
@@ -179,14 +187,14 @@ def test_powers_of_ten_read_as_people_write_them(text, shown):
 
 def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_table_is_a_table():
     panel = Panel(grid(("a",), {"row": [cell("x")]}), 'says "x"')
-    drawn = Figure("t", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
-    page = build_report(Evidence(manifest=RUNS), [Recipe("t", "", "", (), lambda _: drawn, "accuracy")])
+    drawn = Figure("t", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"), section="accuracy")
+    page = build_report(Evidence(manifest=RUNS), [drawn])
     assert '<table aria-label="says &#34;x&#34;" class="grid' in page["report/accuracy.html"]
     said = 'Data: <a href="manifest.html#runs-C10">C10</a>, a table. To compute it again: <code>iapb reproduce --fig'
     assert said in page["report/accuracy.html"] and "&lt;table" not in page["report/accuracy.html"]
     rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))
     for shown, told in ((rows, True), (rows[:-1], False)):  # a long table is cut, and says where the rest is
-        page = joined(Evidence(topics=(one("mechanics", tables={"trees": titled(("x",), shown)}),)), ())
+        page = joined(Evidence(topics=(one("mechanics", tables={"trees": titled(("x",), shown)}),)))
         assert (f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} lines" in page) == told
         assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
 
@@ -233,7 +241,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     region = Region((("tilt", "rad", None, 0.015),), share=0.05)
     where = Part("s.", finding.WHERE, "part in a region", 30, 40, region=region)
     topics = (one("mechanics", Part("a", REPRODUCED), Part("b", REFUTED), said="Most hold."), one("engines", said=""))
-    page = joined(Evidence(claims=(one("C20", *held, where, worst, printed, ours),), topics=topics), ())
+    page = joined(Evidence(claims=(one("C20", *held, where, worst, printed, ours),), topics=topics))
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert all(part.name in first for part in held) and "Most hold." in first and "engines" not in first
     assert "holds where tilt ≤ 0.015 rad" in first and "over all conditions 30 of 40</span>" in first
@@ -345,4 +353,4 @@ def test_a_quantity_that_is_not_quoted_is_named_and_the_time_of_a_step_is_on_the
     evidence = Evidence(topics=(rate,), inputs={"effect_steps": steps})
     assert set(unsaid(evidence)) == set(finding.QUANTITIES) - {"time of a peg step", "speed targets"}
     said = "A time step of the peg in the corner takes 0.44 µs; a loop at 1 kHz allows 1000 µs. 14 of 18"
-    assert said in build_report(evidence, ())[FIRST_PAGE]
+    assert said in build_report(evidence)[FIRST_PAGE]
