@@ -1,7 +1,7 @@
 """The full verification campaign, stored batch by batch: batches are computed once, counterexamples are kept.
 
     out/verify/<key>/impacts-000000000.h5 …      a table per batch: law, cases, failures, worst residual
-    out/verify/<key>/counterexamples/…           runs, for `iapb inspect`: impacts (as FCLIB too) and trajectories
+    out/verify/<key>/counterexamples/…           records of impacts and runs, for `iapb inspect`
 
 The key is a hash of the code, the resolver and the tolerances, so that a change of the code starts a new campaign. A
 batch is written to a temporary file and renamed: a killed process leaves complete batches only.

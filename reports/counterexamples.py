@@ -1,7 +1,7 @@
 """Counterexamples to the laws, stored so that they can be checked again.
 
 A trajectory is stored as its run, all other cases as a record with the seeds that draw them again: an impact also with
-its numbers and the answers of the resolver, and in the FCLIB format.
+its numbers and the answers of the resolver.
 """
 
 from __future__ import annotations
@@ -14,10 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from iapb.errors import IapbError, RunFileError
+from iapb.errors import RunFileError
 from iapb.scene import scene_from_text
-from reference.complementarity.problem import ImpactProblem
-from reference.datasets import write_fclib
 from reference.hdf5 import try_file
 from reference.one_thread import one_thread
 from reference.worlds import run_world
@@ -81,13 +79,6 @@ def keep_counterexample(folder: Path, found: Found, request: CampaignRequest) ->
         case, subject, law = found.case, request.subject(), (LAWS | UNEQUAL_LAWS | ENGINE_LAWS)[found.law]
         record |= {"resolver": ENGINE if found.law in ENGINE_LAWS else request.resolver, "statement": law.statement,
                    **found.struck, "test": as_test(case, found.law, subject.bounds, subject.resolver)}  # fmt: skip
-        e, fclib = case.given_restitution(), path.with_suffix(".hdf5")
-        if case.contacts and np.min(e) >= 0.0:
-            try:
-                write_fclib(fclib, ImpactProblem.from_impact(case.mass_matrix, case.contact_jacobian, case.velocity, e,
-                                                             name=path.stem))
-            except IapbError:  # FCLIB cannot express this extreme input; the record has it
-                fclib.unlink(missing_ok=True)
     return write_record(path, record, found.law, command=recheck_command(Path(path.name), request.resolver))
 
 

@@ -17,12 +17,11 @@ from verification.cost.accuracy import choices, short_time, which_method, work_p
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
 from verification.haptic_rate import haptic_study
 
-LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that take --tables to be printed
+LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that --json alone has
 
 
 def bench(
     full: Annotated[bool, typer.Option("--full", help="More repeats and steps, and compile times.")] = False,
-    tables: Annotated[bool, typer.Option("--tables", help="Print the long tables as well.")] = False,
     budget: Annotated[str, typer.Option("--budget", help="Name the method for an impact in this time, such as 50us.")]
     = "",
     contacts: Annotated[int, typer.Option("--contacts", help="Contacts of that impact.")] = 20,
@@ -38,13 +37,12 @@ def bench(
     facts = {"processor": processor(), "verdict": topic.verdict, "parts": topic.parts, "failures": topic.failures,
              "tables": {name: table.records() for name, table in topic.tables.items()} | {
                  "methods on problems": methods.records()}}  # fmt: skip
-    shown = {name: table for name, table in topic.tables.items() if tables or name not in LONG}
-    shown |= {"which method for a budget": choices(methods)} | ({"methods on problems": methods} if tables else {})
+    shown = {name: table for name, table in topic.tables.items() if name not in LONG}
+    shown["which method for a budget"] = choices(methods)
     lines = [line for name, table in shown.items() for line in (f"\n{name.capitalize()}", table, sentence(table.note))]
     words = {REPRODUCED: "as asked for", MIXED: "not as asked for", NOT_COMPUTED: "not measured"}
     lines += ["", *(sentence(f"{words[part.verdict]}: {part.sentence}", "• ") for part in topic.parts)]
-    if not tables:
-        lines.append(f"Further tables with --tables: {', '.join((*LONG, 'methods on problems'))}.")
+    lines.append(f"Further tables with --json: {', '.join((*LONG, 'methods on problems'))}.")
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in topic.failures]
     return Answer(facts, lines, 1 if topic.failures else 0)
 

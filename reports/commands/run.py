@@ -51,9 +51,6 @@ def run(
                                             "IAPB-push: contacts only push.")] = "IAPB",
     rendering: Rendering = "full",
     set_: Values = None,
-    integrator: Annotated[str | None, typer.Option(
-        help="How a step moves the bodies: momentum, semi_implicit_euler, midpoint or runge_kutta_4; default: the "
-             "scene's choice.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was stopped or killed.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
     json_: Json = False,
@@ -63,8 +60,7 @@ def run(
     Prints the warnings of iapb check first. Ends with status 3 if the result is not to be trusted.
     Memory does not grow with the number of steps. A killed run can be resumed.
     """
-    chosen = [f"integrator={integrator}"] if integrator else []
-    source, runner = scene_given(scene, [*(set_ or []), *chosen]), Runner(out)
+    source, runner = scene_given(scene, set_), Runner(out)
     law = find_world(world, rendering).law
     cautions, (said, _) = check_scene(source, law), cost_in_words(source, law)
     if said:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any
 
@@ -97,17 +96,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class Recipe:
-    """The recipe of a figure: `draw` gets the inputs named in `needs`, by name, and returns the Figure.
-
-    If an input in `needs` is missing, the figure is not drawn, and the page says so.
-    """
+    """The recipe of a figure: `function` gets the inputs named in `needs`; the texts of `key` are in figures.toml."""
 
     key: str
-    number: str
-    title: str
     needs: tuple[str, ...]
-    draw: Callable[[Mapping[str, Any]], Figure]
-    section: str = "figures"
+    function: Callable[..., Drawn]
 
 
 TEXTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(files(__package__).joinpath("figures.toml").read_text("utf-8"))
@@ -116,18 +109,8 @@ MADE: dict[str, Recipe] = {}
 
 def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
     """Make the recipe `key` of figures.toml from the decorated function, which gets one argument per input."""
-    text = TEXTS[key]
-    number, title, section = text.get("number", ""), text["title"], text.get("section", "figures")
-
     def made(function: Callable[..., Drawn]) -> Recipe:
-        def draw(inputs: Mapping[str, Any]) -> Figure:
-            drawn = function(*(inputs[name] for name in needs))
-            caption, *said = (" ".join(words.split()).format(**drawn.told)
-                              for words in (text.get("caption", ""), *text.get("said", ())))
-            return Figure(key, number, title, caption, tuple(drawn.panels), drawn.numbers,
-                          tuple(dict(drawn.legend).items()), needs, (), tuple(said), text.get("claims", ()), section)
-
-        MADE[key] = Recipe(key, number, title, needs, draw, section)
+        MADE[key] = Recipe(key, needs, function)
         return MADE[key]
 
     return made
@@ -138,9 +121,19 @@ def draw(recipe: Recipe, inputs: Mapping[str, Any], failures: list[Failure] | No
 
     If `failures` is None, an exception propagates.
     """
-    missing = tuple(name for name in recipe.needs if inputs.get(name) is None)
-    drawn = None if missing else attempt(recipe.key, partial(recipe.draw, inputs), failures)
-    return drawn or Figure(recipe.key, recipe.number, recipe.title, missing=missing, section=recipe.section)
+    text, missing = TEXTS[recipe.key], tuple(name for name in recipe.needs if inputs.get(name) is None)
+    bare = Figure(recipe.key, text.get("number", ""), text["title"], missing=missing,
+                  section=text.get("section", "figures"))
+
+    def drawn() -> Figure:
+        made = recipe.function(*(inputs[name] for name in recipe.needs))
+        caption, *said = (" ".join(words.split()).format(**made.told)
+                          for words in (text.get("caption", ""), *text.get("said", ())))
+        return replace(bare, caption=caption, panels=tuple(made.panels), numbers=made.numbers,
+                       legend=tuple(dict(made.legend).items()), inputs=recipe.needs, said=tuple(said),
+                       claims=text.get("claims", ()))
+
+    return (None if missing else attempt(recipe.key, drawn, failures)) or bare
 
 
 # A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of the page's variables

@@ -23,22 +23,10 @@ from reports.pages.formulas import formula, prose
 from reports.pages.records import Evidence, anchor, runs_by_user
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import HEADINGS, explained
+from verification import finding
 from verification.claims.conditions import Condition
 from verification.claims.peg import ALL_THREE, NAMED
-from verification.finding import (
-    BEYOND,
-    IN_WORDS,
-    KINDS,
-    MISPRINT,
-    MIXED,
-    REFUTED,
-    REPRODUCED,
-    VERDICTS,
-    WORST_FIRST,
-    Failure,
-    Finding,
-    Part,
-)
+from verification.finding import Failure, Finding, Part
 from verification.hard_cases.findings import ENGINE
 from verification.scenes.measures import COORDINATES
 from verification.table import Table
@@ -48,12 +36,12 @@ FIRST_PAGE = "report.html"
 ROWS_SHOWN = 200
 # The mark of each verdict, of each kind of outcome of a claim, and of the parts that decide nothing. Marks differ in
 # shape as well as in colour.
-OUTCOMES = (*VERDICTS, *KINDS, MISPRINT, BEYOND)
+OUTCOMES = (*finding.VERDICTS, *finding.KINDS, finding.MISPRINT, finding.BEYOND)
 OUTCOME_MARKS = dict(zip(OUTCOMES, "✓◐≈✕○…" + "✓✓◐≈✕○…" + "≠·", strict=True))
 OUTCOME_CLASSES = dict(zip(OUTCOMES, (
     "good", "where", "limited", "bad", "open", "absent", "good", "good", "where", "limited", "bad", "open", "absent",
     "limited", "open"), strict=True))  # fmt: skip
-FINDINGS = IN_WORDS | {MIXED: "mixed"}  # the words for the verdicts of a check that is not a claim of the paper
+FINDINGS = finding.IN_WORDS | {finding.MIXED: "mixed"}  # verdicts of a check that is not a claim of the paper, in words
 
 
 def draw_all(evidence: Evidence, recipes: Iterable[Recipe] = RECIPES, failures: list[Failure] | None = None
@@ -125,7 +113,7 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
 def map_of(claim: Finding) -> Figure | None:
     """Return a map of where a claim holds, over its two decisive conditions; None if it holds everywhere."""
     table = claim.tables.get(claim.key)
-    if not claim.axes or claim.verdict == REPRODUCED or table is None or not table.rows:
+    if not claim.axes or claim.verdict == finding.REPRODUCED or table is None or not table.rows:
         return None
     caption = f"Each mark is one simulated condition of {claim.key}."
     return condition_map(f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes)
@@ -161,13 +149,13 @@ def played(figures: Mapping[str, Sequence[Figure]]) -> dict[str, str]:
 
 def ranked(found: Iterable[Any]) -> list[Any]:
     """Return claims, topics or parts, the worst verdict first."""
-    return sorted(found, key=lambda one: WORST_FIRST.index(one.verdict))
+    return sorted(found, key=lambda one: finding.WORST_FIRST.index(one.verdict))
 
 
 def worst_first(cases: Iterable[Finding]) -> list[Finding]:
     """Return the hard cases: those that the engine fails, then by the number of methods that fail, absent ones last."""
     def rank(case: Finding) -> tuple[bool, bool, int]:
-        failing = [part.name for part in case.parts if part.verdict != REPRODUCED]
+        failing = [part.name for part in case.parts if part.verdict != finding.REPRODUCED]
         return not case.computed, not any(name in ENGINE for name in failing), -len(failing)
 
     return sorted(cases, key=rank)
@@ -175,7 +163,7 @@ def worst_first(cases: Iterable[Finding]) -> list[Finding]:
 
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
-    failing, total = sum(part.verdict == REFUTED for part in topic.parts), len(topic.parts)
+    failing, total = sum(part.verdict == finding.REFUTED for part in topic.parts), len(topic.parts)
     if failing and total > 1:
         return f"{failing} of {total} findings {'fails' if failing == 1 else 'fail'}"
     missing = topic.key == "proofs" and any(part.optional for part in topic.parts)
@@ -184,7 +172,7 @@ def badge_words(topic: Finding) -> str:
 
 def judged(part: Part) -> str:
     """Return the verdict on a part in words: whether its target is met, if it has one."""
-    met = {REPRODUCED: "met", MIXED: "missed", REFUTED: "missed"} if part.target else FINDINGS
+    met = {finding.REPRODUCED: "met", finding.MIXED: "missed", finding.REFUTED: "missed"} if part.target else FINDINGS
     return part.outcome if part.role or part.region else met.get(part.verdict, FINDINGS[part.verdict])
 
 

@@ -16,17 +16,8 @@ from iapb.run import ContactTable, EffectRow, ImpactTable, Run, coordinates_of, 
 from iapb.schema import Quantity
 from reference.hdf5 import Budget
 from reports.provenance import collect_provenance
-from reports.store import io
+from reports.store import io, schema
 from reports.store.keys import content_hash, plain
-from reports.store.schema import (
-    FORMAT,
-    FORMAT_VERSION,
-    GROUPS,
-    JSON_TEXTS,
-    SENTENCES,
-    STATE_ATTRIBUTES,
-    TEXTS,
-)
 
 Reader = Callable[[Any, str, Budget], Any]  # (group, name, budget): `read_values` or `dataset_of`
 TIME = Quantity("time", ("time",), np.float64, "s", "")
@@ -92,7 +83,7 @@ def store_run(
 
 def _columns(run: Run) -> Iterator[tuple[str, Quantity, Any]]:
     """Yield group, declaration and values of every array of a run."""
-    for group, (listed, record_of) in GROUPS.items():
+    for group, (listed, record_of) in schema.GROUPS.items():
         yield from ((group, quantity, getattr(record_of(run), quantity.name)) for quantity in listed)
     for name, values in run.energy.items():
         meaning = name.replace("_", " ")
@@ -102,14 +93,14 @@ def _columns(run: Run) -> Iterator[tuple[str, Quantity, Any]]:
 def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str, str] | None, *,
                growing: bool = False) -> None:  # fmt: skip
     file.attrs.update({
-        "format": FORMAT, "format_version": FORMAT_VERSION, "title": f"{run.scene_name} · {run.world}",
+        "format": schema.FORMAT, "format_version": schema.FORMAT_VERSION, "title": f"{run.scene_name} · {run.world}",
         "status": "complete" if run.complete else "partial", "stopped": run.stopped, "run_key": key, "code": code,
         "dt": float(run.dt), "tool_dofs": run.tool_dofs, "tool_coordinates": run.tool_coordinates,
-        **{name: json.dumps(getattr(run, name), ensure_ascii=False) for name in SENTENCES},
+        **{name: json.dumps(getattr(run, name), ensure_ascii=False) for name in schema.SENTENCES},
     })  # fmt: skip
-    for group, name, attribute in TEXTS:
+    for group, name, attribute in schema.TEXTS:
         value = getattr(run, attribute)
-        if attribute in JSON_TEXTS:
+        if attribute in schema.JSON_TEXTS:
             value = json.dumps(plain(value), ensure_ascii=False, indent=1)
         io.write_text(file.require_group(group), name, value)
     names = file.create_group("mechanism")
@@ -118,7 +109,7 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
         if dimension != "body":
             units = getattr(run, f"{dimension}_units")
             io.write_quantity(names, f"{dimension}_unit", units, [scale], "1", f"unit of each {dimension}")
-    for name in (*GROUPS, "energy", "effects", "provenance"):
+    for name in (*schema.GROUPS, "energy", "effects", "provenance"):
         file.create_group(name, track_order=name in ("energy", "provenance"))
     groups, scales = {name: file[name] for name in file}, dict[tuple[str, str], Any]()  # a look-up takes 0.1 ms
     for group, quantity, values in _columns(run):
@@ -130,7 +121,7 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
         dataset = io.write_quantity(groups[group], quantity.name, values, along, unit_of(quantity, run),
                                     quantity.meaning, growing=growing)  # fmt: skip
         if quantity.name == "state":
-            dataset.attrs.update(STATE_ATTRIBUTES)
+            dataset.attrs.update(schema.STATE_ATTRIBUTES)
     effects = file["effects"]
     scale = io.write_scale(effects, "effect", tuple(effect.name for effect in run.effects), "1")
     active = np.array([effect.active for effect in run.effects], np.int8)
@@ -244,7 +235,7 @@ def _check(run: Run) -> None:
                 raise ValueError(f"{name} holds {line[wrong[0] + 1]} after {line[wrong[0]]}: expected numbers that "
                                  f"never fall, up to {most}")
             last = line[-2]
-    texts = [getattr(run, attribute) for _, name, attribute in TEXTS if name in ("name", "world", "kernel")]
+    texts = [getattr(run, attribute) for _, name, attribute in schema.TEXTS if name in ("name", "world", "kernel")]
     texts += [run.stopped, *run.coordinate_names, *run.velocity_names, *run.body_names, *run.remarks, *run.distrust]
     for text in (*texts, *(part for row in run.effects for part in (row.name, row.reason, row.ignores))):
         if len(str(text).splitlines()) > 1:
@@ -254,13 +245,13 @@ def _check(run: Run) -> None:
 def _run_in(file: Any, path: Path | str, read: Reader, budget: int | None = None) -> Run:
     """Return the run in an open file; `read` is `read_values` (arrays in memory) or `dataset_of` (on disk)."""
     place = Budget(path, file, budget)
-    texts = {attribute: io.read_values(file[group], name, place) for group, name, attribute in TEXTS}
+    texts = {attribute: io.read_values(file[group], name, place) for group, name, attribute in schema.TEXTS}
     tables = {group: {quantity.name: _numbers(read, file[group], quantity, place) for quantity in listed}
-              for group, (listed, _) in GROUPS.items()}  # fmt: skip
+              for group, (listed, _) in schema.GROUPS.items()}  # fmt: skip
     energy, effects, names = io.group_of(file, "energy", path), file["effects"], file["mechanism"]
     lists = [io.read_values(effects, name, place) for name in ("effect", "active", "reason", "ignores")]
-    parts: dict[str, Any] = texts | {attribute: json.loads(texts[attribute]) for attribute in JSON_TEXTS}
-    parts |= {name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in SENTENCES}
+    parts: dict[str, Any] = texts | {attribute: json.loads(texts[attribute]) for attribute in schema.JSON_TEXTS}
+    parts |= {name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in schema.SENTENCES}
     for name in ("tool_dofs", "tool_coordinates"):
         start, stop = file.attrs[name]
         parts[name] = index(start), index(stop)

@@ -36,7 +36,7 @@ from verification.claims import CLAIMS
 from verification.claims.conditions import FULL_GRID
 from verification.claims.peg import ALL_THREE, LARGE
 from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding, Part, finding_of
-from verification.hard_cases.findings import STABLE, finding_on, on_hard_cases
+from verification.hard_cases.findings import STABLE, finding_on
 from verification.laws.topic import counterexample, properties
 from verification.region import Region
 from verification.table import table_from, titled
@@ -81,10 +81,10 @@ def one(key, *parts, said="a", **more):
     return finding_of(key, key, "q", said, parts, **more)
 
 
-def hard_case(*rows, title="bar"):
+def hard_case(*rows):
     numbers = titled(("method", "outcome", "forward error"), rows)
     details = {"source": "ours", "kind": "impact", "why it is hard": "$0.5$ J", "truth": "exact", "expected": "no gain"}
-    return finding_on("bar", title, numbers, details)
+    return finding_on("bar", "bar", numbers, details)
 
 
 LAW = {"law": "KE", "cases": 10, "worst": 0.0, "bound": 1.0, "holds": True, "fault": "sign", "fault caught": True}
@@ -160,16 +160,12 @@ def test_the_pages_say_what_the_records_say_escaped_counted_and_with_their_sourc
     assert "1 on a processor, run 2" in " ".join(joined(replace(EVIDENCE, manifest=other)).split())
 
 
-def test_hard_cases_are_seen_at_a_glance_and_a_refusal_or_an_empty_table_is_no_number():
+def test_hard_cases_are_seen_at_a_glance_the_engines_failures_first_and_a_refusal_is_no_number():
     case = hard_case(("factored", "stable", 1e-16), ("gram", "refused", None))
-    page = joined(Evidence(hard_cases=(case, SKIPPED), topics=(on_hard_cases(()),)))
+    page = joined(Evidence(hard_cases=(case, SKIPPED)))
     for text in ('<span class="good">✓</span>&nbsp;factored: stable', '<span class="bad">✕</span>&nbsp;gram: refused',
-                 "1 of 2 stable", "Skipped: needs bowl.lcp.", "0 of 0 hard cases"):
+                 "1 of 2 stable", "Skipped: needs bowl.lcp."):
         assert text in page, text
-    stable = hard_case(("IAPB", "stable", 0.0))
-    found = on_hard_cases((stable, hard_case(("IAPB", "gains energy", 0.5), title="stiff wall")))
-    assert found.verdict == MIXED and "1 of 2" in found.answer and "“stiff wall” (gains energy)" in found.answer
-    assert "1 cases were skipped" in on_hard_cases((stable, SKIPPED)).answer
     calm, others, ours = (finding_on(name, name, table_from([{"method": "factored", "outcome": own}, {
         "method": "svd", "outcome": other}]), {}) for name, own, other in (
             ("calm", STABLE, STABLE), ("others", STABLE, "refused"), ("ours", "wrong motion", STABLE)))  # fmt: skip
@@ -205,10 +201,8 @@ def test_pages_are_written_whole_with_their_archive_and_too_large_ones_are_refus
         target = write_report(tmp_path / "out", given)
         archives.append((target.parent / ARCHIVE_NAME).read_bytes())
     assert target.read_text() == "<html>" and (tmp_path / "out" / "report" / "idea.html").read_text() == "<p>"
-    assert sorted(path.name for path in target.parent.iterdir()) == ["report", "report.html", ARCHIVE_NAME]
     with ZipFile(target.parent / ARCHIVE_NAME) as file:
         assert {name: file.read(name).decode() for name in file.namelist()} == given
-        assert {info.date_time for info in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}  # or its bytes would not repeat
     assert archives[0] == archives[1]
     with pytest.raises(ArgumentError, match="first page.*1000000"):
         write_report(tmp_path / "new", {FIRST_PAGE: "x" * (LARGEST_FIRST + 1)})
@@ -244,32 +238,21 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     page = joined(Evidence(claims=(one("C20", *held, where, worst, printed, ours),), topics=topics))
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert all(part.name in first for part in held) and "Most hold." in first and "engines" not in first
-    assert "holds where tilt ≤ 0.015 rad" in first and "over all conditions 30 of 40</span>" in first
-    assert "fails, as printed" in first and "fails (beyond the paper)" in first and "Fails in a quantity<" in first
-    (line,) = (line for line in first.split('<span class="part"') if "the one that fails" in line)
-    assert 'title="fails"' in line and "1 of 40 (7 more cannot tell)" in line
-    assert "1 holds for some quantities and fails for others. 125 tests decide these verdicts; 7 more cannot" in page
+    for text in ("holds where tilt ≤ 0.015 rad", "over all conditions 30 of 40</span>", "fails, as printed",
+                 "fails (beyond the paper)", "Fails in a quantity<", "1 of 40 (7 more cannot tell)"):
+        assert text in first, text
+    assert "125 tests decide these verdicts; 7 more" in page
     assert badge_words(topics[0]) == "1 of 2 findings fails" and badge_words(one("p", Part("a", REFUTED))) == "fails"
 
 
-def test_the_first_page_maps_c10_start_by_start_and_says_where_to_stop():
-    claim = CLAIMS["C10"]
-    near, far = {"IAPB": 1e-5, "PB": 1e-4, "CBuc": 1e-4}, {"IAPB": 1e-3, "PB": 1e-4, "CBuc": 1e-4}
-    rows = [start.row() | (near if start.tilt <= 0.015 else far) | {
-        "coordinate": "x", "part": "x", "ideal settles": start.tilt < 0.05} for start in FULL_GRID]  # fmt: skip
-    found = claim.conclude(claim.table_of(rows))
-    assert "does not settle within the run from 48 of 84 starts (tilts from 0.05 rad on)" in found.answer
-    assert "From the others: 24 of 36 in x" in found.answer
-    pile = dict.fromkeys(("share that agrees", "time of (21)", "time of pushing"), 10.0)
-    piles = [pile | {"rows": "touching", "most contacts that agree": 14, "contacts": contacts,
-                     "share of impulses that pull": pulls, "pushing from the LCP": 1e-3 * pulls}
-             for contacts, pulls in ((10, 0.0), (40, 0.25))]  # fmt: skip
-    topic = one("complementarity", tables={"piles": table_from(piles)})
-    page = joined(Evidence(claims=(found,), topics=(topic,)))
-    assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
-    assert "but 14 is no safe limit" in page and f"up to rounding ({prose('3e-04')}" in page
-    fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
-    assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
+def c10(parts, lost=0):
+    """Claim C10 from made-up distances: IAPB is nearest up to a tilt of 0.015 rad, but for the first `lost`."""
+    near, far = ({"IAPB": ours, "PB": 1e-4, "CBuc": 1e-4} for ours in (1e-5, 1e-3))
+    small = [(start, part) for start in FULL_GRID for part in parts if start.tilt <= 0.015]
+    rows = [start.row() | (near if (start, part) in small[lost:] else far) | {
+        "coordinate": part, "part": part, "ideal settles": start.tilt < 0.05}
+            for start in FULL_GRID for part in parts]  # fmt: skip
+    return CLAIMS["C10"].conclude(CLAIMS["C10"].table_of(rows))
 
 
 def told(*claims, topics=()):
@@ -290,26 +273,25 @@ def test_the_answer_is_made_from_the_claims():
     assert "clearly differ, in 40 of 40 in x." in told(one("C10", x, ours))["Holds"]
 
 
-def test_small_tilts_hold_only_if_every_start_that_can_tell_does():
-    claim = CLAIMS["C10"]
-    near, far = ({"IAPB": ours, "PB": 1e-4, "CBuc": 1e-4} for ours in (1e-5, 1e-3))
+def test_the_first_page_maps_c10_and_small_tilts_hold_only_if_every_start_that_can_tell_does():
+    found = c10("x")
+    assert "does not settle within the run from 48 of 84 starts (tilts from 0.05 rad on)" in found.answer
+    page = joined(Evidence(claims=(found,)))
+    assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
+    fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
+    assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
     for lost, label in ((0, "Holds"), (1, "Fails")):
-        starts = [(start, part) for start in FULL_GRID for part in ("x", "y", ALL_THREE) if start.tilt <= 0.015]
-        rows = [start.row() | (far if k < lost else near) | dict.fromkeys(("coordinate", "part"), part) | {
-            "ideal settles": True} for k, (start, part) in enumerate(starts)]  # fmt: skip
-        said = told(claim.conclude(claim.table_of(rows)))
-        assert "at most 0.86° (0.015 rad), imp" in said[label] and f"in x in {24 - lost} of 24" in said[label]
+        said = told(c10(("x", "y", ALL_THREE), lost))
+        assert "at most 0.86° (0.015 rad)" in said[label] and f"in x in {24 - lost} of 24" in said[label]
 
 
-def test_the_first_screen_names_our_failures_the_gravest_first_and_what_is_fast():
-    def topic(key: str, verdict: str, *misses: str) -> Finding:
+def test_the_first_screen_names_our_failures_the_gravest_first_and_what_was_not_computed():
+    def topic(key, verdict, *misses):
         return one(key, Part("p.", verdict), *(Part("q.", verdict, miss=miss) for miss in misses))
 
-    safe, lacking = topic("exact-energy", REPRODUCED), topic("haptic-rate", NOT_COMPUTED)
-    found = told(topics=(safe, lacking))
+    found = told(topics=(topic("exact-energy", REPRODUCED), topic("haptic-rate", NOT_COMPUTED)))
     assert found["Energy of impacts"] == f"a {LIMIT}" and "Is it fast?" not in found
     assert found["Known failures"] == "Not computed: haptic-rate."
-    assert made_from(Evidence(provenance={"commit": "c" * 40})) == f"commit {'c' * 12}"
     given = ("haptic-rate", "mechanics", "stability", "complementarity", "hard-cases", "exact-energy")
     topics = (*(topic(key, MIXED, f"miss of {key}", "more") for key in given), topic("engines", MIXED))
     (fact,) = (fact for fact in facts(Evidence(topics=topics)) if fact.label == "Known failures")

@@ -72,7 +72,7 @@ def chosen(rng, values):
     return values[int(rng.integers(len(values)))]
 
 
-def damaged_bytes(content, rng):
+def damaged_bytes(content, other, rng):
     """Return the bytes with some flipped, lost, repeated, replaced or cut off."""
     for _ in changes(rng):
         at, length = int(rng.integers(len(content) + 1)), int(2 ** rng.uniform(0, 8))
@@ -83,8 +83,12 @@ def damaged_bytes(content, rng):
     return content
 
 
-def damaged_text(text, rng, other=""):
+def damaged_text(sample, other, rng):
     """Return the text with tokens put in, lines and words lost, moved or repeated, or the end of another text."""
+    packed = b"\x1f\x8b"  # the first bytes of what is compressed
+    if sample.startswith(packed) or rng.random() < 0.1:
+        return damaged_bytes(sample, other, rng)
+    text, other = sample.decode(), "" if other.startswith(packed) else other.decode()
     for _ in changes(rng):
         at, lines = int(rng.integers(len(text) + 1)), text.split("\n")
         line, to = (int(rng.integers(len(lines))) for _ in range(2))
@@ -95,40 +99,46 @@ def damaged_text(text, rng, other=""):
             text[:at] + token + text[at:],
             text[:at] + text[at + int(rng.integers(1, 30)) :],
             text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at:],
-            text[:at] + (other[int(rng.integers(len(other))) :] if other else ""),
+            text[:at] + other[int(rng.integers(len(other) + 1)) :],
             "\n".join([*lines[:line], " ".join(words), *lines[line + 1 :]]),
             "\n".join([*lines[:line], shifted, *lines[line + 1 :]]),
             "\n".join(lines[:line] + lines[line + 1 :]),
             "\n".join([*lines[:to], lines[line], *lines[to:]]),
         ])  # fmt: skip
-    return damaged_bytes(text.encode(), rng) if rng.random() < 0.1 else text.encode()
+    return text.encode()
 
 
-def damaged_values(plain, rng):
-    """Return plain values (mappings, lists, numbers, texts) with some replaced, lost, renamed, repeated or nested."""
-    plain = copy.deepcopy(plain)
+def damaged_values(sample, other, rng):
+    """Return a YAML text, half of the time as JSON, which always gets past the first look: its values (mappings, lists,
+    numbers, texts) with some replaced, lost, renamed, repeated or nested."""
+    if rng.random() < 0.5:
+        return damaged_text(sample, other, rng)
+    plain = copy.deepcopy(values_of(sample))
     for _ in changes(rng):
         places = list(places_of(plain))
         if not places:
-            return plain
+            break
         (owner, key), (other, where) = chosen(rng, places), chosen(rng, places)
-        kind, taken = int(rng.integers(7)), copy.deepcopy(other[where])
-        if kind <= 1:
-            owner[key] = copy.deepcopy(chosen(rng, VALUES))
-        elif kind == 2:
+        value, taken, kind = owner[key], copy.deepcopy(other[where]), int(rng.integers(7))
+        if kind == 0:
             del owner[key]
-        elif kind == 3:
-            owner[key] = taken
-        elif kind == 4 and isinstance(owner, list):
+        elif kind == 1 and isinstance(owner, list):
             owner.insert(key, taken)
-        elif kind == 4:
+        elif kind == 1:
             owner[f"{key}s"] = owner.pop(key)
-        elif kind == 5 and isinstance(owner[key], int | float):
-            owner[key] = float(owner[key]) * float(10.0 ** rng.integers(-12, 12)) * float(rng.choice([-1.0, 1.0]))
         else:
+            nested = value
             for _ in range(int(rng.choice([1, 1, 2, NEST]))):
-                owner[key] = [owner[key]] if rng.random() < 0.5 else {"name": owner[key]}
-    return plain
+                nested = [nested] if rng.random() < 0.5 else {"name": nested}
+            factor = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.integers(-12, 12))
+            scaled = float(value) * factor if isinstance(value, int | float) else nested
+            owner[key] = chosen(rng, [taken, nested, scaled, *(copy.deepcopy(chosen(rng, VALUES)) for _ in range(2))])
+    return json.dumps(plain).encode()
+
+
+@cache
+def values_of(sample):
+    return Document(sample.decode()).value
 
 
 def places_of(value):
@@ -139,37 +149,32 @@ def places_of(value):
             yield from places_of(value[key])
 
 
-def damaged_hdf5(content, rng):
+def damaged_hdf5(content, other, rng):
     """Damage to what the file says: parts lost, renamed, of another shape or type."""
     stream, names = io.BytesIO(content), []
     with h5py.File(stream, "r+") as file:
         file.visit(names.append)
         for _ in changes(rng):
-            if (name := chosen(rng, names)) in file:
-                damage_part(file, name, rng)
+            name, wrong, kind = chosen(rng, names), chosen(rng, WRONG), int(rng.integers(5))
+            if name not in file:
+                continue
+            owner = chosen(rng, [file, file[name]])
+            if kind == 0 and len(owner.attrs):
+                attribute = chosen(rng, sorted(owner.attrs))
+                del owner.attrs[attribute]
+                if isinstance(wrong, np.ndarray) and rng.random() < 0.5:
+                    owner.attrs[attribute] = wrong
+            elif kind == 1:
+                file.move(name, f"{name}_")
+            else:
+                del file[name]
+                if kind == 2:
+                    file.create_group(name)
+                elif isinstance(wrong, tuple):  # stated to be large, never written: a few bytes on the disk
+                    file.create_dataset(name, shape=wrong, dtype=np.float64, chunks=(1024,) * len(wrong))
+                elif kind == 3:
+                    file[name] = wrong
     return stream.getvalue()
-
-
-def damage_part(file, name, rng):
-    kind, wrong = int(rng.integers(5)), chosen(rng, WRONG)
-    owner = file[name] if rng.random() < 0.5 else file
-    if kind == 0 and len(owner.attrs):
-        attribute = chosen(rng, sorted(owner.attrs))
-        if rng.random() < 0.5 or not isinstance(wrong, np.ndarray):
-            del owner.attrs[attribute]
-        else:
-            owner.attrs[attribute] = wrong
-        return
-    if kind == 1:
-        file.move(name, f"{name}_")
-        return
-    del file[name]
-    if kind == 2:
-        file.create_group(name)
-    elif isinstance(wrong, tuple):  # stated to be large, never written: a few bytes on the disk
-        file.create_dataset(name, shape=wrong, dtype=np.float64, chunks=(1024,) * len(wrong))
-    elif kind >= 3:
-        file[name] = wrong
 
 
 WRONG = (
@@ -181,38 +186,6 @@ WRONG = (
 
 
 # The kinds of input: samples, their damage, and who reads them
-
-
-def as_bytes(sample, other, rng):
-    return damaged_bytes(sample, rng)
-
-
-def as_text(sample, other, rng):
-    """Texts as texts; what is compressed, as bytes."""
-    if sample[:2] == b"\x1f\x8b":
-        return damaged_bytes(sample, rng)
-    return damaged_text(sample.decode(), rng, "" if other[:2] == b"\x1f\x8b" else other.decode())
-
-
-def as_values(sample, other, rng):
-    """Half of the cases are damaged as values: they are always YAML, and get past the first look."""
-    if rng.random() < 0.5:
-        return as_text(sample, other, rng)
-    return json.dumps(damaged_values(plain(sample), rng)).encode()
-
-
-@cache
-def plain(sample):
-    return Document(sample.decode()).value
-
-
-def as_hdf5(sample, other, rng):
-    return damaged_bytes(sample, rng) if rng.random() < 0.3 else damaged_hdf5(sample, rng)
-
-
-def as_hdf5_sealed(sample, other, rng):
-    """Under a seal that is right: somebody else's program wrote it."""
-    return sealed(damaged_hdf5(sample, rng))
 
 
 @cache
@@ -270,29 +243,12 @@ LINES = (
     "reproduce --figure fig99",
 )  # fmt: skip
 LONG = {"verify", "prove", "reproduce", "compare", "bench"}  # a line that might start long work gets a wrong word
-WORDS = (
-    "--world", "--set", "--out", "--rendering", "--", "-", "--help", "run", "effects", "inspect", "schema", "store",
-    "CBuc", "ideal", "peg_room", "wall_1d", ".", "/", "a=b", "=", "duration=0.01", "rate=1e999", "bodies.peg.mass=0",
-    "walls=[]", "bodies=[]", "couplings=~", "hand=", "bodies.9.mass=1", "contact..x=1", "name=..", "-1", "--impacts",
-    "run.h5", "table.h5", "results", "", "contact.friction=0.3", "check", "gc",
-)  # fmt: skip
-
-
-def damaged_line(sample, other, rng):
-    """Return a line, as JSON, with words lost, doubled, exchanged or damaged."""
-    words = json.loads(sample)
-    for _ in range(int(rng.choice([1, 1, 1, 2, 3]))):
-        at, known = int(rng.integers(len(words) + 1)), str(chosen(rng, WORDS if rng.random() < 0.7 else TOKENS))
-        cut = words[at][: int(rng.integers(1 + len(words[at])))] if at < len(words) else ""
-        after = words[at + 1 :]
-        words = words[:at] + chosen(rng, [[known, *words[at:]], [known, *after], after, [cut + known, *after],
-                                          [*words[at:], *json.loads(other)[1:]]])  # fmt: skip
-    return json.dumps(words).encode()
 
 
 def run_line(path):
     """Run a line where the files are that it may name; it must end with 0, 1 or 2, and say why where it is not 0."""
-    words = [word for word in json.loads(path.read_bytes()) if word != "--debug"]  # which shows a traceback
+    words = path.read_text(errors="replace").split()
+    words = [word for word in words if word != "--debug"]  # which shows a traceback
     words += ["--no-such-option"] if set(words) & LONG else []
     for place in (path.parent, path.parent / "results"):
         place.mkdir(exist_ok=True)
@@ -308,15 +264,15 @@ def run_line(path):
 
 
 KINDS = {  # samples, damage, reader, and how many cases are tried: fewer where a case takes long
-    "scenes": (lambda: shipped("*.yaml"), as_values, read_scene, 300),
-    "URDF robots": (lambda: shipped("robots/*.urdf"), as_text, read_robot, 200),
-    "sweep studies": (lambda: shipped("sweeps/*.yaml"), as_values, read_study, 200),
-    "LCP and MLCP files": (lambda: PROBLEMS, as_text, read_problem, 200),
-    "FCLIB files": (fclib_files, as_hdf5, read_problem, 200),
-    "run files and tables": (result_files, as_bytes, read_results, 200),
-    "sealed run files": (result_files, as_hdf5_sealed, read_results, 60),
-    "command lines": (lambda: {f"{number:02d}.json": json.dumps(line.split()).encode()
-                               for number, line in enumerate(LINES)}, damaged_line, run_line, 60),
+    "scenes": (lambda: shipped("*.yaml"), damaged_values, read_scene, 300),
+    "URDF robots": (lambda: shipped("robots/*.urdf"), damaged_text, read_robot, 200),
+    "sweep studies": (lambda: shipped("sweeps/*.yaml"), damaged_values, read_study, 200),
+    "LCP and MLCP files": (lambda: PROBLEMS, damaged_text, read_problem, 200),
+    "FCLIB files": (fclib_files, lambda sample, other, rng: chosen(rng, [damaged_bytes, damaged_hdf5, damaged_hdf5])(
+        sample, other, rng), read_problem, 200),
+    "run files and tables": (result_files, damaged_bytes, read_results, 200),
+    "sealed run files": (result_files, lambda *given: sealed(damaged_hdf5(*given)), read_results, 60),
+    "command lines": (lambda: {line: line.encode() for line in LINES}, damaged_text, run_line, 60),
 }  # fmt: skip
 
 
