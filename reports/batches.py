@@ -118,7 +118,7 @@ class _Pool(ProcessPoolExecutor):
 _said: Any = None  # in a worker: where the parent reads
 
 
-def tell_parent(message: Any) -> None:
+def tell_parent(*message: Any) -> None:
     """Send a message from a worker; the parent reads `said` of its pool."""
     _said.put(message)
 

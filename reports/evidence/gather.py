@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -136,10 +136,10 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
     if not ahead:
         return
     with suppress(IapbError), batches.worker_pool(batches.cores()) as pool:
-        running = {pool.submit(_figure_runs, out)}
+        running: set[Future[Any]] = {pool.submit(_figure_runs, out)}
         for name in ahead:
             running |= {pool.submit(_slowest_runs, out, depth)} if name == ON_THE_PEG else set()
-            running |= {pool.submit(_filled, stages[name], out, depth)}
+            running |= {pool.submit(_fill, stages[name], Runner(out / "runs"), depth, batches.tell_parent)}
         running.add(pool.submit(_compile_ahead, out, depth))
         while running:
             done, running = wait(running, PAUSE, FIRST_COMPLETED)
@@ -148,10 +148,9 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
                 progress(*pool.said.get())
 
 
-def _figure_runs(out: Path) -> Stage | None:
+def _figure_runs(out: Path) -> None:
     """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those that fail."""
-    runs.figure_runs(Runner(out / "runs"), partial(_tell, FIGURE_RUNS), [])
-    return None
+    runs.figure_runs(Runner(out / "runs"), partial(batches.tell_parent, FIGURE_RUNS), [])
 
 
 def _compile_ahead(out: Path, depth: str) -> None:
@@ -169,15 +168,6 @@ def _slowest_runs(out: Path, depth: str) -> None:
         if (out / "runs" / runner.file_of(scene, world)).is_file():
             return
         attempt("", partial(runner, scene, world, keep=False), [])  # the claim that needs it will name the failure
-
-
-def _filled(stage: Stage, out: Path, depth: str) -> Stage | None:
-    """Return a stage with its records, in a worker."""
-    return _fill(stage, Runner(out / "runs"), depth, _tell)
-
-
-def _tell(*said: Any) -> None:
-    batches.tell_parent(said)
 
 
 def manifest(used: Mapping[str, StoredFile], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:

@@ -378,19 +378,19 @@ def test_verify_judges_the_counterexample_of_a_resolver_again_and_prove_says_wha
 def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, monkeypatch):
     choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
     tables, asked = {"one": Table((Column("x"),), ((1,),))}, []
-    findings = [Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)]
+    finding = Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)
     for name, stand_in in (("which_method", lambda *given: asked.append(given) or (choice,)),
-                           ("haptic_study", lambda *_: findings[-1]), ("choices", lambda _: Table(())),
+                           ("haptic_study", lambda *_: with_failures(finding, [FAILED])),
+                           ("choices", lambda _: Table(())),
                            ("work_precision", lambda **_: Table((Column("y"),), ((2,),)))):
         monkeypatch.setattr(f"reports.commands.bench.{name}", stand_in)
     status, found = answer("bench", "--budget", "50us", "--contacts", "7", "--coordinates", "3")
     assert asked == [(pytest.approx(5e-5), 7, 3)]
     assert status == 0 and found["choices"][0]["method"] == "factored"
     status, found = answer("bench")
-    assert status == 0 and set(found) == listed("bench") and "• as asked for: s" in iapb("bench")[1]
+    assert status == 1 and set(found) == listed("bench")
     assert found["tables"] == {"one": [{"x": 1}], "methods on problems": [{"y": 2}]}
-    findings.append(with_failures(findings[0], [FAILED]))
-    assert "Not computed: four contacts: SolverError: no solution" in iapb("bench")[1] and answer("bench")[0] == 1
+    assert "Not computed: four contacts: SolverError: no solution" in iapb("bench")[1]
 
 
 @pytest.mark.parametrize("device", [(), ("--device", "simulated", "--no-budget")], ids=str)
@@ -412,25 +412,17 @@ def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb,
     door = ("compare", SLOPE.with_name("door.yaml"), "--set", "duration=0.15", "--worlds", "IAPB", "--against", "IAPB")
     status, out, err = iapb(*door, "--impacts", "1")
     assert status == 0 and max(map(len, out.splitlines())) <= show.WIDTH, err
-    rows = [line.split() for line in out.splitlines() if " none " in line or " friction " in line]
-    by_solver = {row[0]: row[2:6] for row in rows}
+    by_solver = {row[0]: row[2:6] for row in map(str.split, out.splitlines()) if {"none", "friction"} & set(row)}
     assert by_solver["lemke"] == by_solver["nsgs"] == ["1", "1", "0", "0"]
-    if "pinocchio_pgs" in by_solver:
-        assert "pinocchio_pgs refused 1, such as impact 1 at 0.115 s, μ = 0.2: takes contacts of three" in " ".join(
-            out.split())
-    assert Path("out/compare/door.json").is_file() and Path("out/compare/door.svg").is_file()
     place, slope = Path("mine/slope.json"), ("compare", SLOPE, "--set", "duration=0.05", "--worlds")
     status, out, err = iapb(*slope, "IAPB,ideal,ideal-friction", "--out", place)
     lines = out.splitlines()
     assert status == 0 and max(map(len, lines)) <= show.WIDTH and len(lines) < 60, err
-    for said in ("Closest to ideal-friction is ", "ideal ignores friction, stiffness, damping.", f"Stored in {place}"):
-        assert said in out
+    assert "Closest to ideal-friction is " in out and f"Stored in {place}" in out
     found = json.loads(place.read_text(encoding="utf-8"))
-    assert found["details"]["worlds"] == "IAPB, ideal, ideal-friction" and found["parts"][0]["name"] == "runs"
     assert set(found["tables"]) == {"worlds", "over time"} and len(found["tables"]["over time"]["rows"]) == 3 * 51
     assert [row[0] for row in found["tables"]["worlds"]["rows"]] == ["IAPB", "ideal", "ideal-friction"]
-    picture = place.with_suffix(".svg").read_text(encoding="utf-8")
-    assert "ideal-friction (reference)" in picture and "penetration [mm]" in picture
+    assert "ideal-friction (reference)" in place.with_suffix(".svg").read_text(encoding="utf-8")
 
 
 def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():
