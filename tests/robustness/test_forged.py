@@ -3,6 +3,7 @@
 Each is refused in one sentence, in little memory and time.
 """
 
+import gzip
 import io
 import json
 import os
@@ -23,7 +24,6 @@ import h5py
 import numpy as np
 import pytest
 
-from iapb import certify_impacts
 from iapb.errors import ArgumentError, IapbError, RunFileError
 from iapb.mechanics.urdf import read_urdf
 from reference.datasets import read_problem
@@ -212,7 +212,7 @@ def test_what_is_odd_is_read_or_refused(tmp_path):
             assert status in (0, 1) and "Traceback" not in said, said
 
 
-def test_problem_files_and_npz_cannot_ask_for_any_memory_nor_show_another_file(tmp_path):
+def test_problem_files_npz_and_robots_cannot_ask_for_any_memory_nor_show_another_file(tmp_path):
     (tmp_path / "x").mkdir()
     changes = {"a": ("vectors/q", {"shape": 4000, "dtype": "S1000000"}, "cannot be read"),
                "b": ("vectors/q", {"shape": 10**8, "dtype": "f8"}, "cannot be read"),
@@ -239,6 +239,12 @@ def test_problem_files_and_npz_cannot_ask_for_any_memory_nor_show_another_file(t
                 for _ in range(100):
                     member.write(bytes(8_000_000))
     assert "unpacks to" in refused("certify", tmp_path / "bomb.npz")
+    (tmp_path / "bomb.lcp.gz").write_bytes(gzip.compress(b"0 " * (40 << 20), 1))
+    assert "MB" in refused(tmp_path / "bomb.lcp.gz", act=read_problem)
+    robots = [{"name": f"r{k}", "urdf": "absent.urdf"} for k in range(1000)]
+    scene = {"name": "s", "dimensions": 3, "rate": 100, "duration": 1, "bodies": [], "robots": robots}
+    (tmp_path / "s.yaml").write_text(json.dumps(scene))
+    assert "at most 100 robots" in refused("run", tmp_path / "s.yaml")
 
 
 @pytest.mark.parametrize(("before", "after"), [
@@ -273,17 +279,6 @@ def test_a_pipe_is_refused_and_not_waited_for_and_odd_encodings_are_refused(tmp_
         Path("other.urdf").write_text(f"<?xml version='1.0' encoding='{encoding}'?><robot name='r'/>")
         with pytest.raises(ArgumentError):
             read_urdf("other.urdf")
-
-
-@pytest.mark.parametrize(("matrix", "said"), [
-    ([[1.0 + 1e-3j, 0.0], [0.0, 1.0]], "mass_matrix = .*real numbers"), ([["1", "0"], ["0", "1"]], "real numbers"),
-    ([[1.0, 2.0], [2.0, 1.0]], "impact 0.*negative"), ([[1.0, 0.0], [0.0]], "real numbers"),
-    (np.ma.masked_array(np.eye(2), mask=True), "real numbers"), (np.eye(2) + np.longdouble(1e-18), "finite double"),
-    (np.eye(2) * np.longdouble("1e400"), "finite double"),
-])  # fmt: skip
-def test_impacts_of_no_mass_matrix_are_refused(matrix, said):
-    with pytest.raises(ArgumentError, match=said):
-        certify_impacts(matrix, [1.0, 0.0], [-1.0, 0.0])
 
 
 def test_parts_without_their_law_do_not_stop_a_repair(tmp_path):

@@ -86,7 +86,12 @@ def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.Mo
     ({"v_plus": [[1.0, 2.0, 3.0]]}, "v_plus"), ({"mass_matrix": np.eye(3)}, "mass_matrix"),
     ({"v_minus": [[np.nan, 1.0]]}, "no finite double"), ({"v_minus": np.ones((1, 1, 2))}, "v_minus"),
     ({"impulse": [[np.nan, 1.0]]}, "impulse"), ({"impulse": [[1.0]]}, "impulse"),
-    ({"v_minus": np.ones((9, 0))}, "d > 0")])  # fmt: skip
+    ({"v_minus": np.ones((9, 0))}, "d > 0"), ({"mass_matrix": [[1.0, 2.0], [2.0, 1.0]]}, "impact 0.*negative"),
+    *(({"mass_matrix": matrix}, "mass_matrix.*real numbers") for matrix in (
+        [[1.0 + 1e-3j, 0.0], [0.0, 1.0]], [["1", "0"], ["0", "1"]], [[1.0, 0.0], [0.0]],
+        np.ma.masked_array(np.eye(2), mask=True))),
+    *(({"mass_matrix": np.eye(2) * factor}, "finite double") for factor in (
+        1.0 + np.longdouble(1e-18), np.longdouble("1e400")))])  # fmt: skip
 def test_wrong_arrays_are_refused_by_name(change: dict[str, object], argument: str) -> None:
     good: dict[str, object] = {"mass_matrix": np.eye(2), "v_minus": [[1.0, 1.0]], "v_plus": [[0.5, 0.5]]}
     with pytest.raises(ArgumentError, match=argument):

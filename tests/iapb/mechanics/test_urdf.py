@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from iapb.errors import ArgumentError, SceneError
 from iapb.mechanics.mechanism import Mechanism
-from iapb.mechanics.urdf import read_collisions
-from iapb.scene import load_scene, scene_from_text
+from iapb.mechanics.urdf import read_collisions, read_urdf
+from iapb.scene import load_scene, scene_folder, scene_from_text
 from iapb.simulation import simulate
 
 INERTIAL = """<inertial><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/><mass value="2"/>
@@ -89,6 +90,8 @@ MISTAKES = {
     "no mass": ([link("base", "<inertial><origin/></inertial>")], "base.*inertial"),
     "no izz": ([link("base", INERTIAL.replace("izz", "i_zz"))], "base.*izz"),
     "name twice": ([BASE, BASE], "base"),
+    "inertial twice": ([link("base", "<inertial/><inertial/>")], "twice"),
+    "wrong attribute": ([link("base", INERTIAL.replace("xyz", "xzy"))], "xzy"),
     "no name": (["<link/>"], "name"),
     "no child": ([BASE, '<joint name="j" type="fixed"><parent link="base"/></joint>'], "'j'.*child"),
     "two roots": ([BASE, ARM], "base.*arm"),
@@ -101,6 +104,24 @@ MISTAKES = {
 def test_mistakes_name_the_element(read, elements, named):
     with pytest.raises(ArgumentError, match=named):
         read(*elements)
+
+
+def test_what_others_add_is_let_through(read):
+    added = "<gazebo/>", link("a", "<contact/><visual/>"), "<transmission name='t'/>"
+    assert len(read(*added).names) == 1
+
+
+@pytest.mark.parametrize("tag", ["link", "joint", "inertial", "collision", "origin", "mass", "inertia", "axis",
+                                 "parent", "child", "geometry"])  # fmt: skip
+def test_no_element_can_be_misspelt(tag, tmp_path):
+    """One letter lost, anywhere in a shipped file; alike for the two readers of it."""
+    text, wrong = (scene_folder() / "robots" / "seven_axis_arm.urdf").read_text(), tag[:-2] + tag[-1]
+    for found in re.finditer(rf"<{tag}\b", text):
+        path = tmp_path / "robot.urdf"
+        path.write_text(text[: found.start()] + re.sub(rf"(</?){tag}\b", rf"\1{wrong}", text[found.start() :]))
+        with pytest.raises(ArgumentError):
+            read_urdf(path)
+            read_collisions(path)
 
 
 @pytest.mark.parametrize(("text", "named"), [
