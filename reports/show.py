@@ -63,16 +63,17 @@ def sentence(text: str, mark: str = "") -> str:
                          break_long_words=False)  # fmt: skip
 
 
-def table_text(table: Table, keys: int = 1) -> str:
-    """Return a table as text. A table that is too wide continues below, with its first `keys` columns repeated."""
+def table_text(table: Table) -> str:
+    """Return a table as text. A table that is too wide continues below, with its first column repeated."""
     columns = [_wrapped(title, [_text(row[k], table.digits) for row in table.cells])
                for k, title in enumerate(table.titles)]  # fmt: skip
-    shown = [column for k, column in enumerate(columns) if k < keys or any(cell != ["-"] for cell in column[1:])]
-    blocks = [shown[:keys]]
-    for column in shown[keys:]:
-        if len(blocks[-1]) > keys and sum(map(_width, [*blocks[-1], column])) > WIDTH + len(_GAP):
-            blocks.append(shown[:keys])
-        blocks[-1] = [*blocks[-1], column]
+    blocks = [columns[:1]]
+    for column in columns[1:]:
+        if all(cell == ["-"] for cell in column[1:]):
+            continue
+        if len(blocks[-1]) > 1 and sum(map(_width, [*blocks[-1], column])) > WIDTH + len(_GAP):
+            blocks.append(columns[:1])
+        blocks[-1].append(column)
     return "\n\n".join(map(_printed, blocks))
 
 

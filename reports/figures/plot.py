@@ -124,11 +124,11 @@ class Plot:
             axis.set_major_formatter(lambda value, _: power_of_ten(value))
             axis.set_minor_locator(NullLocator())
 
-    def ticks(self, axis: str, values: Iterable[float], form: str = "{:g}") -> None:
+    def ticks(self, axis: str, values: Iterable[float]) -> None:
         """Write numbers at the places on "x" or "y" that are in view."""
         low, high = sorted(getattr(self.axes, f"get_{axis}lim")())
         shown = [value for value in values if low <= value <= high]
-        getattr(self.axes, f"set_{axis}ticks")(shown, [form.format(value) for value in shown])
+        getattr(self.axes, f"set_{axis}ticks")(shown, [f"{value:g}" for value in shown])
 
 
 # Pictures of scenes: equal scales, no axes, filled walls and bodies; lengths are in metres
@@ -159,11 +159,10 @@ class Canvas(Plot):
         for corners in wall_outlines(scene, reach):
             self.axes.fill(*corners.T, facecolor=WALL, edgecolor="none", zorder=1)
 
-    def bodies(self, scene: Mapping[str, Any], pose: Floats | None = None, *, color: str = PEG, edge: str = INK,
-               width: float = 1.1) -> None:  # fmt: skip
+    def bodies(self, scene: Mapping[str, Any], pose: Floats | None = None) -> None:
         """Fill the moving bodies at a `pose` of a run, by default at the start of the scene."""
         for corners in body_outlines(scene, pose):
-            self.axes.fill(*corners.T, facecolor=color, edgecolor=edge, linewidth=width, zorder=2)
+            self.axes.fill(*corners.T, facecolor=PEG, edgecolor=INK, linewidth=1.1, zorder=2)
 
     def hand(self, scene: Mapping[str, Any], pose: Floats | None, length: float) -> None:
         """Draw the hand's force as an arrow of the given length [m] from the point that it holds; call it last."""
