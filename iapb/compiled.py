@@ -22,7 +22,6 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from itertools import accumulate
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -166,12 +165,11 @@ class Block:
 
     def __init__(self, content: Any) -> None:
         given = content if isinstance(content, dict) else content._asdict()
-        self._members = {name: block(value) if isinstance(value, dict) or hasattr(value, "_fields") else value
+        self.members = {name: block(value) if isinstance(value, dict) or hasattr(value, "_fields") else value
                          for name, value in given.items()}
-        self._content = SimpleNamespace(**self._members) if given is content else content._replace(**self._members)
-        vars(self).update(self._members)  # found without a call of __getattr__
-        self.block_type = _type_of(type(content).__name__, *((k, _kind(value)) for k, value in self._members.items()))
-        self._memory = np.array([word for value in self._members.values() for word in _layout(value)], np.int64)
+        vars(self).update(self.members)
+        self.block_type = _type_of(type(content).__name__, *((k, _kind(value)) for k, value in self.members.items()))
+        self._memory = np.array([word for value in self.members.values() for word in _layout(value)], np.int64)
         self.address = self._memory.ctypes.data
 
     def __reduce__(self) -> Any:
@@ -180,13 +178,8 @@ class Block:
 
     def arrays(self) -> list[np.ndarray]:
         """Return all arrays, including those of nested blocks."""
-        found = [value for value in self._members.values() if isinstance(value, np.ndarray)]
-        return found + [each for value in self._members.values() if isinstance(value, Block) for each in value.arrays()]
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # as when unpickling
-            raise AttributeError(name)
-        return getattr(self._content, name)
+        found = [value for value in self.members.values() if isinstance(value, np.ndarray)]
+        return found + [each for value in self.members.values() if isinstance(value, Block) for each in value.arrays()]
 
 
 def block(content: Any) -> Any:

@@ -82,27 +82,20 @@ def unit_of(vector):
 
 
 @kernel
-def in_range(cross, square):
-    """Whether vᵀMΔv < 0 < ΔvᵀMΔv, and both are far from underflow and overflow."""
-    return 2.0**-900 < square < 2.0**900 and -(2.0**900) < cross < -(2.0**-900)
+def least_energy(mass_matrix, v, change):
+    """Return the α at which v + α Δv has the least energy, −vᵀMΔv / ΔvᵀMΔv; 0 if every α > 0 gains energy.
 
-
-@kernel
-def passive_range(mass_matrix, v, change):
-    """Return the α at which v + α Δv has the least energy, and the largest α without a gain: −x/y and −2x/y.
-
-    Here x = vᵀMΔv and y = ΔvᵀMΔv. Both results are 0 if every α > 0 gains energy. Vectors whose squares under- or
-    overflow are scaled first.
+    Vectors whose squares under- or overflow are scaled first.
     """
     cross, square = quadratic_forms(mass_matrix, v, change)
     scale = 1.0
-    if not in_range(cross, square):
+    if not (2.0**-900 < square < 2.0**900 and -(2.0**900) < cross < -(2.0**-900)):
         v_unit, change_unit = unit_of(v), unit_of(change)
         cross, square = quadratic_forms(mass_matrix, v, change, v_unit, change_unit)
         scale = change_unit / v_unit
     if not square > 0.0 or cross >= 0.0:
-        return 0.0, 0.0
-    return -cross / square * scale, -2.0 * cross / square * scale
+        return 0.0
+    return -cross / square * scale
 
 
 @kernel

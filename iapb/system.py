@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.advice.checks import chosen_scene
-from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for, facts_of
+from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.compiled import Entry, block, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity
 from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
@@ -215,9 +215,8 @@ class System:
             hand_body=-1 if hand is None else self.mechanism.index(hand.body),
             device_body=-1 if hand is None else device.index(hand.body),
             mechanism=device.block, body=make_workspace(len(device.bodies), device.nv),
-            varying_inertia=not device.has_constant_mass_matrix, damped="device_damping" in on,
-            free=make_free_motion(device.arrays, device.tree_of_body), limited="device_limits" in on,
-            quantised="quantisation" in on,
+            varying_inertia=not device.has_constant_mass_matrix, quantised="quantisation" in on,
+            free=make_free_motion(device.arrays, device.tree_of_body),
         )
         for name, values in coupling.settings.items():
             if len(values) != lengths["tool"]:  # else the kernels would read past the end
@@ -227,11 +226,12 @@ class System:
         port.device_q[:] = port.sensed_q[:] = port.measured_q[:] = self.start[0][q_start:q_stop]
         port.device_v[:] = self.start[1][v_start:v_stop]
         port.force_limit[:] = np.inf
-        if settings is not None:
-            for array, values in ((port.force_limit, settings.force_limit),
-                                  (port.device_damping, settings.damping if port.damped else None),
-                                  (port.resolution, settings.position_resolution if port.quantised else None)):
-                array[:] = array if values is None else values
+        for effect, array, values in () if settings is None else (
+                ("device_limits", port.force_limit, settings.force_limit),
+                ("device_damping", port.device_damping, settings.damping),
+                ("quantisation", port.resolution, settings.position_resolution)):
+            if effect in on:
+                array[:] = values
         if hand is not None:
             port.device_mass[:] = device.mass_matrix(port.device_q)
             _factored(port.device_mass, port.device_lower)
@@ -241,8 +241,7 @@ class System:
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
         """Return the effects under a law and a coupling; the world, the port and the record are made from them."""
-        facts = facts_of(self.scene, self.mechanism, self.shapes, self.pairs)
-        return decide_for(self.scene, facts, law, coupling)
+        return decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
 
 
 _SYSTEMS: dict[int, System] = {}  # the last used ones, by the identity of the scene, which the system keeps alive

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.advice.checks import chosen_scene
 from iapb.contact import laws
@@ -22,6 +21,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene
 from iapb.scene.mechanism import frictions_of, mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.model import Device
+from iapb.schema import Indices
 
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
 TURNING_JOINTS = ("revolute", "continuous", "planar", "spherical", "free_flyer")
@@ -43,23 +43,17 @@ class Effect:
     ignores: str = ""
 
 
-class Facts(NamedTuple):
-    """Quantities derived from a scene that the effects need besides its fields."""
-
-    mechanism: Mechanism
-    wall_pairs: int  # candidate pairs of a moving shape and a static one
-    body_pairs: int  # candidate pairs of shapes of two trees
-    tree_pairs: int  # candidate pairs of shapes of one tree
-    restitutions: tuple[float, ...]  # different values of e among the pairs, ascending
-    frictions: tuple[float, ...]  # different values of mu among the pairs, ascending
-
-
 @dataclass(frozen=True)
 class Question:
     """A scene and the caller's law, coupling and rendering. None means not chosen yet: only the scene decides."""
 
     scene: Scene
-    facts: Facts
+    mechanism: Mechanism
+    wall_pairs: int  # candidate pairs of a moving shape and a static one
+    body_pairs: int  # candidate pairs of shapes of two trees
+    tree_pairs: int  # candidate pairs of shapes of one tree
+    restitutions: list[float]  # different values of e among the pairs, ascending
+    frictions: list[float]  # different values of mu among the pairs, ascending
     law: str | None
     uses: frozenset[str]  # parts of the contact section that the law uses
     coupling: str | None
@@ -74,7 +68,7 @@ class Question:
     @cached_property
     def sinking(self) -> list[str]:
         """Names of bodies whose generalized gravity force is not exactly zero at all of some random poses."""
-        mechanism, field, chance = self.facts.mechanism, self.scene.gravity or (), np.random.default_rng(0)
+        mechanism, field, chance = self.mechanism, self.scene.gravity or (), np.random.default_rng(0)
         q = np.array([x for body in self.scene.bodies for x in body.position], np.float64)
         felt = np.zeros(mechanism.nv, np.bool_)
         for _ in range(_POSES if any(field) else 0):
@@ -99,7 +93,8 @@ class Question:
     def no_contact(self) -> str:
         """Return why nothing can touch; empty if shapes, or joints with limits that the law keeps, can."""
         stops = laws.JOINTS in self.uses and any(body.joint_limits is not None for body in self.scene.bodies)
-        return "" if any(self.facts[1:4]) or stops else "nothing can touch: the scene has no pair of shapes"
+        pairs = self.wall_pairs or self.body_pairs or self.tree_pairs
+        return "" if pairs or stops else "nothing can touch: the scene has no pair of shapes"
 
     def no_device(self) -> str:
         """Return why no device takes part; empty if one does."""
@@ -185,7 +180,7 @@ def _joints(what: str, unit: str, left_out: str) -> Rule:
 
 def _by_pair(q: Question, field: str) -> str:
     """Return text with restitution or friction of the pairs that can touch."""
-    values = q.facts.restitutions if field == "restitution" else q.facts.frictions
+    values = q.restitutions if field == "restitution" else q.frictions
     if len(values) > 1:
         how = {"restitution": "the smaller that body or wall of a pair gives",
                "friction": "by pair: of two values the geometric mean"}[field]
@@ -196,9 +191,9 @@ def _by_pair(q: Question, field: str) -> str:
 
 def _smooth(q: Question) -> str:
     """Return why no pair has friction; empty if one has."""
-    if not q.facts.frictions:
+    if not q.frictions:
         return "nothing can rub: the scene has no pair of shapes"
-    return "" if q.facts.frictions[-1] > 0.0 else _by_pair(q, "friction")
+    return "" if q.frictions[-1] > 0.0 else _by_pair(q, "friction")
 
 
 def _contact(field: str, unit: str, part: str, left_out: str, more: Reason = lambda q: "", ignores: str = "") -> Rule:
@@ -222,10 +217,10 @@ EFFECTS: dict[str, Rule] = {
         lambda q: f"the mass matrix depends on the configuration: {q.turning} carries mass off its axis or other links",
         "links would keep the inertia of their first pose",
         lambda q: "the mass matrix is constant: it is factored once, before the first step"
-        if q.facts.mechanism.has_constant_mass_matrix else ""),
+        if q.mechanism.has_constant_mass_matrix else ""),
     "velocity_terms": Rule(lambda q: f"bodies carried by {q.turning} feel Coriolis or centripetal forces",
                            "swinging links would gain or lose energy in free motion",
-                           lambda q: "" if q.facts.mechanism.has_velocity_terms
+                           lambda q: "" if q.mechanism.has_velocity_terms
                            else "no joint feels the velocity of another: B(q, v) is zero for every motion"),
     "hand_force": Rule(_push, "the tool would not be pushed",
                        lambda q: "" if _push(q) else "the hand holds still: hand.force is zero",
@@ -234,16 +229,16 @@ EFFECTS: dict[str, Rule] = {
     "joint_damping": _joints("damping", "N s/m, N m s/rad", "joints would turn and slide without loss"),
     "joint_limits": _joints("limits", "rad, m", "joints would turn and slide without end"),
     # what can touch
-    "wall_contacts": Rule(lambda q: f"{_count(q.facts.wall_pairs)} of a moving shape and a static one can touch",
+    "wall_contacts": Rule(lambda q: f"{_count(q.wall_pairs)} of a moving shape and a static one can touch",
                           "bodies would pass through walls",
-                          lambda q: "" if q.facts.wall_pairs else "no moving shape has a static one to touch"),
-    "body_contacts": Rule(lambda q: f"{_count(q.facts.body_pairs)} of shapes of separate bodies can touch",
+                          lambda q: "" if q.wall_pairs else "no moving shape has a static one to touch"),
+    "body_contacts": Rule(lambda q: f"{_count(q.body_pairs)} of shapes of separate bodies can touch",
                           "moving bodies would pass through each other",
-                          lambda q: "" if q.facts.body_pairs else "no two separate moving bodies have shapes"),
+                          lambda q: "" if q.body_pairs else "no two separate moving bodies have shapes"),
     "self_collisions": Rule(
-        lambda q: f"contact.self_collisions = true, and {_count(q.facts.tree_pairs)} of links that are not neighbours "
+        lambda q: f"contact.self_collisions = true, and {_count(q.tree_pairs)} of links that are not neighbours "
         "can touch", "links of one tree would pass through each other",
-        lambda q: "" if q.facts.tree_pairs
+        lambda q: "" if q.tree_pairs
         else "contact.self_collisions = true, but no two links with shapes are more than one joint apart",
         absent=lambda q: "" if q.scene.contact.self_collisions else "contact.self_collisions = false"),
     # Impulses (20)-(21) at new contacts. Different restitution in one impact and friction in impacts are future
@@ -251,12 +246,12 @@ EFFECTS: dict[str, Rule] = {
     "impulses": Rule(lambda q: f"new contacts collide: {_by_pair(q, 'restitution')}",
                      "bodies would be stopped by springs alone and sink in further",
                      lambda q: f"{_by_pair(q, 'restitution')}: an impulse would be zero"
-                     if q.facts.restitutions[-1] == -1.0 else "",
+                     if q.restitutions[-1] == -1.0 else "",
                      (laws.IMPULSES, laws.OWN_RESTITUTION), ignores="restitution"),
     "unequal_restitution": Rule(
         lambda q: f"pairs that can touch differ: {_by_pair(q, 'restitution')}",
         "all contacts of a collision would bounce alike",
-        lambda q: "" if len(q.facts.restitutions) > 1 else f"alike everywhere: {_by_pair(q, 'restitution')}",
+        lambda q: "" if len(q.restitutions) > 1 else f"alike everywhere: {_by_pair(q, 'restitution')}",
         (laws.OWN_RESTITUTION,)),
     "impact_friction": Rule(
         lambda q: _by_pair(q, "friction"), "bodies would bounce without losing tangential speed",
@@ -324,32 +319,25 @@ def decide_effects(
         all effects in a fixed order, each with its state, the reason, and what would change without it.
     """
     scene, _ = chosen_scene(scene)
-    mechanism, shapes = mechanism_of(scene), shapes_of(scene)
-    return decide_for(scene, facts_of(scene, mechanism, shapes, pairs_of(scene, shapes)), law, coupling, rendering)
+    shapes = shapes_of(scene)
+    return decide_for(scene, mechanism_of(scene), shapes, pairs_of(scene, shapes), law, coupling, rendering)
 
 
-def facts_of(scene: Scene, mechanism: Mechanism, shapes: Shapes, pairs: NDArray[np.int32]) -> Facts:
-    """Return the facts of a scene from its mechanism, shapes and candidate pairs (k, 2)."""
+def decide_for(scene: Scene, mechanism: Mechanism, shapes: Shapes, pairs: Indices, law: laws.ContactLaw | str | None,
+               coupling: Coupling | str | None, rendering: str | None = None) -> tuple[Effect, ...]:
+    """Do what `decide_effects` does for the scene of `chosen_scene` with its shapes and candidate pairs (k, 2)."""
     body_a, body_b = shapes.body[pairs.T]
     wall, same = body_b < 0, mechanism.tree_of_body[body_a] == mechanism.tree_of_body[body_b]
     to_walls, between, within = (int(each.sum()) for each in (wall, ~wall & ~same, ~wall & same))
     restitutions, frictions = restitutions_of(scene, pairs), np.unique(frictions_of(scene).by_pair(pairs))
-    return Facts(mechanism, to_walls, between, within, tuple(restitutions.tolist()), tuple(frictions.tolist()))
-
-
-def decide_for(
-    scene: Scene, facts: Facts, law: laws.ContactLaw | str | None, coupling: Coupling | str | None,
-    rendering: str | None = None,
-) -> tuple[Effect, ...]:
-    """Do what `decide_effects` does for the scene of `chosen_scene` with known facts."""
     if law is not None and not isinstance(law, str):
         law = law.within(scene) if hasattr(law, "within") else law
         rendering = getattr(law, "rendering", "full") if rendering is None else rendering
     known = laws.ENGINE_LAWS.get(law) if isinstance(law, str) else law
     uses = laws.EVERYTHING | {laws.JOINTS} if known is None else getattr(known, "uses", laws.EVERYTHING)
     names = (one if one is None or isinstance(one, str) else one.name for one in (law, coupling))
-    q = Question(scene, facts, next(names), uses, next(names), coupling if hasattr(coupling, "stiffness") else None,
-                 rendering)
+    q = Question(scene, mechanism, to_walls, between, within, restitutions.tolist(), frictions.tolist(), next(names),
+                 uses, next(names), coupling if hasattr(coupling, "stiffness") else None, rendering)
     return tuple(rule.decide(name, q) for name, rule in EFFECTS.items())
 
 

@@ -103,11 +103,6 @@ class _EngineLaw:
         settings = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: value for name, value in settings.items() if name != "pushing" or value}
 
-    @classmethod
-    def runs_compiled(cls) -> bool:
-        """Return whether the compiled loop computes the step of `advance`: False if a subclass overrides `advance`."""
-        return cls.advance is _EngineLaw.advance
-
 
 @dataclass(frozen=True)
 class ImpulseAugmented(_EngineLaw):

@@ -48,9 +48,7 @@ class Port(NamedTuple):
     device_mass: Annotated[Floats, "tool tool"]
     device_lower: Annotated[Floats, "tool tool"]
     device_damping: Annotated[Floats, "tool"]  # physical damping b of the device
-    damped: bool
-    force_limit: Annotated[Floats, "tool"]  # [N, N m], inf = none
-    limited: bool  # the actuators clip the commanded force to force_limit
+    force_limit: Annotated[Floats, "tool"]  # [N, N m] to which the actuators clip the commanded force, inf = none
     resolution: Annotated[Floats, "tool"]  # [m, rad] of the position sensors, in the tangent where q is no vector
     quantised: bool
     delayed_force: Annotated[Floats, "slot tool"]  # ring of actuator forces on their way; one slot: no delay
@@ -202,9 +200,7 @@ def command(port):
     for i in range(port.device_force.shape[0]):
         k = port.v_start + i
         force = (port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0) - port.coupling_force[k]
-        if port.limited:
-            force = min(max(force, -port.force_limit[i]), port.force_limit[i])
-        port.delayed_force[now, i] = force
+        port.delayed_force[now, i] = min(max(force, -port.force_limit[i]), port.force_limit[i])
         port.device_force[i] = port.delayed_force[(port.clock[0] + 1) % slots, i]
 
 
@@ -216,9 +212,7 @@ def move_device(world, state, port):
     """
     a = port.acceleration
     for i in range(a.shape[0]):
-        a[i] = port.device_hand_force[i] + port.device_force[i]
-        if port.damped:
-            a[i] -= port.device_damping[i] * port.device_v[i]
+        a[i] = port.device_hand_force[i] + port.device_force[i] - port.device_damping[i] * port.device_v[i]
     finite = True
     if port.varying_inertia:
         forward_kinematics(port.mechanism, port.device_q, port.body)

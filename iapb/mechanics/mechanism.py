@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb import linalg
-from iapb.compiled import Block, Entry, block
+from iapb.compiled import Entry, block
 from iapb.errors import ArgumentError
 from iapb.mechanics import structure
 from iapb.mechanics.bodies import Body, finite_array, float_array, parents_and_trees
@@ -42,8 +42,8 @@ class _Scratch(threading.local):
     """Scratch memory of the kernels, for all bodies and for the moving parts alone; each thread has its own."""
 
     def __init__(self, bodies: int, parts: int, dofs: int) -> None:
-        self.workspace: Block = block(make_workspace(bodies, dofs))
-        self.parts: Block = block(make_workspace(parts, dofs))
+        self.workspace: Any = block(make_workspace(bodies, dofs))
+        self.parts: Any = block(make_workspace(parts, dofs))
 
 
 class Mechanism:
@@ -155,10 +155,7 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        place, out = float_array("q", q, (self.nq,)), np.empty((1, self.nv, self.nv))
-        if not self._entries.mass_matrices_at(self._parts, self._scratch.parts, place[None], out):
-            self._place(place)
-        return out[0]
+        return self.mass_matrices(self._place(q)[None])[0]
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
@@ -170,12 +167,7 @@ class Mechanism:
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
-        place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
-        out = np.empty((1, self.nv))
-        if not self._entries.biases_at(self._parts, self._scratch.parts, place[None], rates[None], out):
-            self._place(place)
-            self._rates(rates)
-        return out[0]
+        return self.biases(self._place(q)[None], self._rates(v)[None])[0]
 
     def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
@@ -248,9 +240,9 @@ class Mechanism:
         """Return (6,): momentum [N s] and angular momentum [N m s] about the moving bodies' centre of mass."""
         return self._filled((6,), self._entries.centroidal_momentum, self._at(q), self._rates(v))
 
-    def _at(self, q: ArrayLike) -> Block:
+    def _at(self, q: ArrayLike) -> Any:
         """Return this thread's scratch with the kinematics of q; the next call overwrites it."""
-        workspace: Block = self._scratch.workspace
+        workspace = self._scratch.workspace
         self._entries.forward_kinematics(self.block, self._place(q), workspace)
         return workspace
 

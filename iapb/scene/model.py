@@ -286,9 +286,10 @@ class Scene(ScenePart):
 
     @property
     def source_text(self) -> str:
-        """The YAML text of this scene."""
+        """The YAML text of this scene; reading it gives the same values to the last bit."""
         if not self._source_text:
-            self._source_text, self._about = scene_text(self, self._about), ""
+            comment, self._about = f"# {self._about}\n" * bool(self._about), ""
+            self._source_text = comment + yaml_text(self.resolved())
         return self._source_text
 
     def place_of(self, *path: str | int) -> str:
@@ -447,11 +448,6 @@ def _tool(given: Any, bodies: list[dict[str, Any]], names: list[str | None], roo
 def scene_kind(given: Any) -> type[Scene]:
     """Return the class of scene that plain values describe: `SpatialScene` or `Scene`."""
     return SpatialScene if isinstance(given, dict) and "dimensions" in given else Scene
-
-
-def scene_text(scene: Scene, comment: str = "") -> str:
-    """Return the YAML text of this scene; reading it gives the same values to the last bit."""
-    return f"# {comment}\n" * bool(comment) + yaml_text(scene.resolved())
 
 
 def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:

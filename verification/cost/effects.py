@@ -20,7 +20,7 @@ import numpy as np
 from iapb import decide_effects, find_scene, load_scene
 from iapb.advice.effects import EFFECT_NAMES
 from iapb.compiled import block
-from iapb.contact.kernels.world import Switches
+from iapb.contact.kernels import world as engine
 from iapb.contact.laws import Penalty
 from iapb.errors import IapbError
 from iapb.haptics.coupling import NoCoupling
@@ -73,7 +73,7 @@ LEFT_OUT: dict[str, Variant] = {
 }  # fmt: skip
 # Effects that a switch of the step can turn on in a scene that does not need them; they then change nothing. Friction
 # in impacts is not among them, because its law needs arrays of its own.
-SWITCHED = tuple(name for name in Switches._fields if name in EFFECT_NAMES and name != "impact_friction")
+SWITCHED = tuple(name for name in engine.Switches._fields if name in EFFECT_NAMES and name != "impact_friction")
 _WHOLE, _ALL_ON = "with its effects", "all switched on"
 SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")  # scenes whose effects are shown one by one
 _BELOW = "below the noise"
@@ -243,8 +243,8 @@ class Loop(RecordedLoop):
             _leave_out_pairs(self.simulation, variant.untouched)
         if variant.switches:
             given = self.simulation.world
-            switches = given.switches._content._replace(**dict.fromkeys(variant.switches, variant.on))
-            self.simulation.world = block(given._content._replace(switches=switches))
+            switches = engine.Switches(**given.switches.members | dict.fromkeys(variant.switches, variant.on))
+            self.simulation.world = block(engine.World(**given.members | {"switches": switches}))
 
     def same_motion(self, other: Loop) -> bool:
         """Whether positions and velocities of tool and device are equal to the last bit in all steps."""

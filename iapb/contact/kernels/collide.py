@@ -307,7 +307,7 @@ def strike_again(world, state):
     for i in range(count):
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         e = pair_restitution(world, contacts, i)
-        if (group >= 0 and state.state_of_tree[group] == COLLIDING and contacts.gap[i] <= 0.0 and e > 0.0
+        if (state.state_of_tree[group] == COLLIDING and e > 0.0
                 and now.normal_velocity[i] < -world.approach_velocity):
             contacts.mark[i], contacts.collides[i], some = STRIKES, True, True
         elif contacts.mark[i] == STRIKES:

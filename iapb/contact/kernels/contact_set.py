@@ -117,21 +117,11 @@ def contact_before(state, i, begin):
 
 
 @kernel
-def moving_tree(world, body):
-    """Return the tree of a body that can move, else -1: the static world and bodies fixed to it do not link groups."""
-    if body < 0:
-        return -1
-    tree = world.tree_of_body[body]
-    return tree if world.tree_stop[tree] > world.tree_start[tree] else -1
-
-
-@kernel
 def join(world, contacts, i, group_of_tree):
-    """Merge the groups of the trees of contact i if both can move; the root of a group is its smallest tree."""
-    b = moving_tree(world, contacts.body_b[i])  # often the static world
-    a = moving_tree(world, contacts.body_a[i]) if b >= 0 else -1
-    if a < 0:
+    """Merge the groups of the two trees of contact i; the root of a group is its smallest tree."""
+    if contacts.body_b[i] < 0:
         return
+    a, b = world.tree_of_body[contacts.body_a[i]], world.tree_of_body[contacts.body_b[i]]
     while group_of_tree[a] != a:
         a = group_of_tree[a]
     while group_of_tree[b] != b:
@@ -141,47 +131,40 @@ def join(world, contacts, i, group_of_tree):
 
 @kernel
 def group_of_contact(world, contacts, i, group_of_tree):
-    """Return the group of a contact, -1 if neither of its bodies can move."""
-    tree = moving_tree(world, contacts.body_a[i])
-    if tree < 0:
-        tree = moving_tree(world, contacts.body_b[i])
-    return group_of_tree[tree] if tree >= 0 else -1
+    """Return the group of a contact, that of its body a, which can move."""
+    return group_of_tree[world.tree_of_body[contacts.body_a[i]]]
 
 
 @kernel
 def classify(world, state, count):
     """Write the groups, the state of each (free, colliding, resting) and the contacts that collide.
 
-    Contacts between moving trees link groups. Only contacts with gap <= 0 count. A contact approaches if
-    v_n < −approach_velocity [m/s]. With impulses a group collides if one of its *new* contacts approaches, or if any
-    contact approaches while an impulse is still being spread. Then every approaching contact of the group, new or old,
-    enters the impact. `spreading`, trees with an unfinished impulse, is cleared if the group no longer collides.
+    Contacts between two bodies that can move link groups. A contact approaches if v_n < −approach_velocity [m/s]. With
+    impulses a group collides if one of its *new* contacts approaches, or if any contact approaches while an impulse is
+    still being spread. Then every approaching contact of the group, new or old, enters the impact. `spreading`, trees
+    with an unfinished impulse, is cleared if the group no longer collides.
     """
     contacts, groups, states, spreading = state.contacts, state.group_of_tree, state.state_of_tree, state.spreading
     trees, approaching = groups.shape[0], False
     for t in range(trees):
         groups[t], states[t] = t, FREE
     for i in range(count):
-        if contacts.gap[i] <= 0.0:
-            join(world, contacts, i, groups)
+        join(world, contacts, i, groups)
     for t in range(trees):
         groups[t] = groups[groups[t]]  # smaller trees are settled already
         if spreading[t]:
             spreading[groups[t]] = True
     for i in range(count):
         group = group_of_contact(world, contacts, i, groups)
-        collides = contacts.gap[i] <= 0.0 and contacts.normal_velocity[i] < -world.approach_velocity
+        collides = contacts.normal_velocity[i] < -world.approach_velocity
         contacts.collides[i] = collides
         approaching = approaching or collides
-        if contacts.gap[i] > 0.0 or group < 0:
-            continue
         if world.switches.impulses and collides and (contacts.is_new[i] or spreading[group]):
             states[group] = COLLIDING
         elif states[group] == FREE:
             states[group] = RESTING
     for i in range(count if approaching else 0):
-        group = group_of_contact(world, contacts, i, groups)
-        if group < 0 or states[group] != COLLIDING:
+        if states[group_of_contact(world, contacts, i, groups)] != COLLIDING:
             contacts.collides[i] = False
     for t in range(trees):
         states[t] = states[groups[t]]
@@ -240,7 +223,7 @@ def add_supports(world, state):
         bounces = bounces or contacts.collides[i] and pair_restitution(world, contacts, i) > 0.0
     for i in range(state.contact_count[0] if bounces else 0):
         group = group_of_contact(world, contacts, i, state.group_of_tree)
-        if group < 0 or state.state_of_tree[group] != COLLIDING or contacts.collides[i] or contacts.gap[i] > 0.0:
+        if state.state_of_tree[group] != COLLIDING or contacts.collides[i]:
             continue
         before = contact_before(state, i, begin)
         if before >= 0:

@@ -48,7 +48,7 @@ def rest_implicitly(world, state, rubs):
         if rubs:
             store(contacts.friction_force, i, (0.0, 0.0, 0.0))
         group = group_of_contact(world, contacts, i, state.group_of_tree)
-        if group >= 0 and contacts.gap[i] <= 0.0 and contacts.mark[i] != LEFT:
+        if contacts.mark[i] != LEFT:
             work.next[i], work.first[group], some = work.first[group], i, True
     if not some:
         return

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from iapb.compiled import copy_into, kernel
-from iapb.double_double import passive_range, two_product, two_sum
+from iapb.double_double import least_energy, two_product, two_sum
 
 UNIT = 2.0**-53
 _UNDERFLOW = 2.0**-1020  # 2⁵⁴ η: a normal number, since each operation with a subnormal one takes 0.1 µs
@@ -159,7 +159,7 @@ def passive_step(mass_matrix, v, change, alpha, w):
     """
     if _moved(mass_matrix, v, change, alpha, w):
         return alpha
-    longest, step = alpha - passive_range(mass_matrix, v, change)[0], 2.0**-52 * alpha
+    longest, step = alpha - least_energy(mass_matrix, v, change), 2.0**-52 * alpha
     while longest > 0.0:
         step = min(step, longest)
         write_step(v, change, alpha - step, w)

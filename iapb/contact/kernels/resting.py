@@ -33,12 +33,10 @@ def friction_share(normal_force, speed, friction, friction_velocity):
 
 @kernel(needs="explicit")
 def resting_force(world, state, contacts, i):
-    """Add the forces (4) of contact i, if its gap <= 0, to those of the stage, as generalized forces Jᵀ F.
+    """Add the forces (4) of contact i to those of the stage, as generalized forces Jᵀ F.
 
     contacts : velocities up to date (`contact_velocities`); normal_force and friction_force are written
     """
-    if contacts.gap[i] > 0.0:
-        return
     force = normal_force(contacts.gap[i], contacts.normal_velocity[i], world.stiffness, world.damping, world.clamped)
     contacts.normal_force[i] = force
     x, n = load(contacts.point, i), load(contacts.normal, i)

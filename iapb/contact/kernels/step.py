@@ -62,7 +62,9 @@ STATUS_TEXT = {
 @kernel
 def advance(world, state, applied):
     """Advance (q, v) by one step under the generalized force `applied` (d,); return a status."""
-    clear(state)
+    for k in range(state.v.shape[0]):  # forces and impulses of the step before
+        state.penalty_force[k] = state.friction_force[k] = state.impulse[k] = 0.0
+    state.impacts.logged[0] = 0
     if not locate(world, state):
         return NOT_POSITIVE_DEFINITE
     if world.switches.contacts:
@@ -81,14 +83,6 @@ def contact_state(state, tool_tree):
         if tool_tree in (-1, t) and (found == FREE or state.state_of_tree[t] == COLLIDING):
             found = state.state_of_tree[t]
     return found
-
-
-@kernel
-def clear(state):
-    """Set the forces and impulses of the step before to zero."""
-    for k in range(state.v.shape[0]):
-        state.penalty_force[k] = state.friction_force[k] = state.impulse[k] = 0.0
-    state.impacts.logged[0] = 0
 
 
 @kernel
@@ -363,8 +357,7 @@ def accelerate(world, state, applied, stage):
     for i in range(count):
         contacts.normal_force[i] = 0.0
         store(contacts.friction_force, i, (0.0, 0.0, 0.0))
-        group = group_of_contact(world, contacts, i, state.group_of_tree)
-        if group >= 0 and state.state_of_tree[group] != COLLIDING:
+        if state.state_of_tree[group_of_contact(world, contacts, i, state.group_of_tree)] != COLLIDING:
             resting_force(world, state, contacts, i)
     for k in range(a.shape[0]):
         a[k] = applied[k] + state.stage_penalty[k] + state.stage_friction[k]

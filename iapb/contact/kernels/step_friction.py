@@ -13,7 +13,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
-from iapb.contact.kernels.contact_set import contact_before, moving_tree
+from iapb.contact.kernels.contact_set import contact_before
 from iapb.contact.kernels.impact_friction import along_row, combine, friction_sweeps, set_inertia
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
 from iapb.linalg import add, add_multiple, dot, dot_of, load, scale, solve_tree_blocks, store
@@ -66,9 +66,9 @@ class RestWork(NamedTuple):
 
 @kernel
 def trees_of_contact(world, contacts, i, start, at, size):
-    """Return the two trees of a contact, −1 = none or the same; write their first coordinates by `start`, and sizes."""
-    a, b = moving_tree(world, contacts.body_a[i]), moving_tree(world, contacts.body_b[i])
-    trees = (b, -1) if a < 0 else (a, -1 if b == a else b)
+    """Return the two trees of a contact, the second −1: none, or the same; write their first coordinates and sizes."""
+    a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
+    trees = (a, -1 if b < 0 or world.tree_of_body[b] == a else world.tree_of_body[b])
     for side in range(2):
         t = trees[side]
         at[side] = start[t] if t >= 0 else 0
