@@ -85,17 +85,11 @@ def unit_of(vector):
 def least_energy(mass_matrix, v, change):
     """Return the α at which v + α Δv has the least energy, −vᵀMΔv / ΔvᵀMΔv; 0 if every α > 0 gains energy.
 
-    Vectors whose squares under- or overflow are scaled first.
+    The vectors are scaled first, so that their squares neither under- nor overflow.
     """
-    cross, square = quadratic_forms(mass_matrix, v, change)
-    scale = 1.0
-    if not (2.0**-900 < square < 2.0**900 and -(2.0**900) < cross < -(2.0**-900)):
-        v_unit, change_unit = unit_of(v), unit_of(change)
-        cross, square = quadratic_forms(mass_matrix, v, change, v_unit, change_unit)
-        scale = change_unit / v_unit
-    if not square > 0.0 or cross >= 0.0:
-        return 0.0
-    return -cross / square * scale
+    v_unit, change_unit = unit_of(v), unit_of(change)
+    cross, square = quadratic_forms(mass_matrix, v, change, v_unit, change_unit)
+    return -cross / square * (change_unit / v_unit) if square > 0.0 and cross < 0.0 else 0.0
 
 
 @kernel

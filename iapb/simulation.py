@@ -3,7 +3,7 @@
     every step of length Δt:
         hand and coupling pull the tool                 (VI)   couple
         contacts → collisions → resting forces → move   (III-V, IV)   the law
-        F_env is rendered, the device moves             (V-C, VI)   drive_device
+        F_env is rendered, the device moves             (V-C, VI)   render, move_device
 
 A step has two halves, and a real device moves between them. In `begin_step` hand and coupling pull, the law advances
 and the device gets its force. In `end_step` the compiled device moves, or the position of a real device is read.
@@ -31,7 +31,7 @@ from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult,
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
-from iapb.haptics.rendering import NO_COUPLING, couple, drive_device, move_device, render
+from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
 from iapb.recording import Recorder, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
@@ -54,7 +54,8 @@ def compiled_steps(world, state, port, record, first, steps):  # type: ignore[no
         status = advance(world, state, port.applied)
         if status:
             return k, status
-        if not drive_device(world, state, port):
+        render(world, state, port)
+        if port.coupling != NO_COUPLING and not move_device(world, state, port):
             return k, DEVICE_NOT_FINITE
         write_step(record, line + k, first + k, state, port)
     return steps, 0

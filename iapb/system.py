@@ -112,13 +112,9 @@ class System:
 
         `effects` is the result of `decide` for the law and any coupling.
         """
-        return self._engine(law, effects)[0]
+        return self.engine_under(law, effects)[0]
 
-    def advance_under(self, law: Any) -> Entry:
-        """Return the compiled step of one of the engine's laws, for repeated calls (cached)."""
-        return self._engine(law)[1]
-
-    def _engine(self, law: Any, effects: Sequence[Effect] | None = None) -> tuple[World, Entry]:
+    def engine_under(self, law: Any, effects: Sequence[Effect] | None = None) -> tuple[World, Entry]:
         """Return the parameters of the scene with the switches of its effects under a law, and the step; made once."""
         scene, contact, mechanism, law = self.scene, self.scene.contact, self.mechanism, law.within(self.scene)
         key = law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.pushing

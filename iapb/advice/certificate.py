@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,8 @@ from iapb.run import Run, digests
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.reading import scene_from_values
 from iapb.schema import Booleans, Floats, Integers
+
+Batch = tuple[Floats, Floats, Floats, Floats | None]  # M (n or 1, d, d), v⁻, v⁺ (n, d), and M (v⁺ − v⁻) as recorded
 
 EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
@@ -154,8 +156,7 @@ def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, **others: ArrayLike) ->
     return [masses, before, *vectors]
 
 
-@dataclass(frozen=True)
-class Judged:
+class Judged(NamedTuple):
     """The exact answers `gained` (n,), and the numbers of impacts that integers decided and confirmed."""
 
     gained: Booleans
@@ -171,7 +172,10 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
     IapbError
         The bound and the integers disagree, so this program or the processor has a fault.
     """
-    masses, before, after = _impacts(mass_matrix, v_minus, v_plus=v_plus)
+    return _judged(*_impacts(mass_matrix, v_minus, v_plus=v_plus))
+
+
+def _judged(masses: Floats, before: Floats, after: Floats) -> Judged:
     signs = np.empty(len(before), np.int64)
     gain_signs(masses, before, after, signs)
     gained, unsure, checked = signs > 0, np.flatnonzero(signs == 0), np.flatnonzero(signs)[::_CHECKED]
@@ -213,7 +217,18 @@ def certify(run: Run) -> Certificate:
         raise ArgumentError("impacts.step", step, "steps that never fall")
     silent = run.law not in ENGINE_LAWS and not any(  # another world may not record impulses of contacts
         piece.contacts.impulse.any() for piece in _pieces(run, step))
-    return _joined([_certify(piece, silent) for piece in _pieces(run, step)])
+    residuals: list[tuple[float, float, float]] = []  # total, span and restitution of each piece
+
+    def batches() -> Iterator[Batch]:
+        for piece in _pieces(run, step):
+            residuals.append((_total(piece), *_contacts(piece, silent)))
+            yield from _batches(piece)
+
+    found = _certificate(batches())
+    total, span, restitution = np.fmax.reduce(residuals).tolist()
+    every_row = bool(np.all(run.impacts.rank[:] >= run.impacts.rows[:]))  # else a budget, which is not recorded
+    judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
+    return replace(found, span=span, restitution=restitution, total=total, restitution_judged=judged)
 
 
 def _pieces(run: Run, step: Integers) -> Iterator[Any]:
@@ -226,7 +241,7 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
         last, hits = first + max(len(offsets) - 1, 1), np.searchsorted(step, (first, first + len(offsets) - 1))
         columns = {
             "contacts": (slice(offsets[0], offsets[-1]), ("body_a", "body_b", "point", "normal", "impulse")),
-            "impacts": (slice(*hits), ("v_minus", "v_plus", "impulse", "rows", "rank", "scale", "mass_digest"))}
+            "impacts": (slice(*hits), ("v_minus", "v_plus", "impulse", "scale", "mass_digest"))}
         tables: dict[str, Any] = {
             table: SimpleNamespace(**{name: np.asarray(getattr(getattr(run, table), name)[rows]) for name in names})
             for table, (rows, names) in columns.items()}
@@ -236,20 +251,8 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
         first = last
 
 
-def _joined(found: list[Certificate]) -> Certificate:
-    """Return one certificate of pieces of a run."""
-    gained = next((one for one in found if one.gains), found[0])
-    before = sum(one.impacts for one in found[: found.index(gained)])
-    most: dict[str, Any] = {name: float(np.fmax.reduce([getattr(one, name) for one in found]))
-            for name in ("largest_gain", "momentum", "span", "restitution", "total")}
-    counts = {name: sum(getattr(one, name) for one in found) for name in ("impacts", "gains", "by_integers", "checked")}
-    judged = [one.restitution_judged for one in found if one.impacts]
-    return replace(gained, **counts, **most, first_gain=gained.first_gain + before * bool(gained.gains),
-                   restitution_judged=bool(judged) and all(judged))
-
-
-def _certify(run: Any, silent: bool) -> Certificate:
-    """Judge one piece of a run in memory."""
+def _total(run: Any) -> float:
+    """Return `Certificate.total` of a piece, whose numbers must be finite."""
     table, contacts, sums, size = run.impacts, run.contacts, -run.impulse, np.abs(run.impulse)
     for name in ("v_minus", "v_plus", "impulse", "scale"):
         _finite(f"impacts.{name}", getattr(table, name))
@@ -259,16 +262,10 @@ def _certify(run: Any, silent: bool) -> Certificate:
     _finite("q", run.q[table.step])
     np.add.at(sums, table.step, table.impulse)
     np.add.at(size, table.step, np.abs(table.impulse))
-    total = _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
-    if not len(table.step):
-        return _certificate([], total=total)
-    span, restitution = _contacts(run, silent)
-    every_row = bool((table.rank >= table.rows).all())  # a row budget drops rows, and the record does not say why
-    judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
-    return _certificate(_batches(run), total=total, span=span, restitution=restitution, restitution_judged=judged)
+    return _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
 
 
-def _batches(run: Any) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
+def _batches(run: Any) -> Iterator[Batch]:
     """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of `_BATCH`."""
     table, mechanism = run.impacts, mechanism_of(scene_from_values(run.scene_resolved))
     for start in range(0, len(table.step), _BATCH):
@@ -325,7 +322,7 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
     given = {"v_plus": v_plus} | ({} if impulse is None else {"impulse": impulse})
     masses, *vectors = _impacts(mass_matrix, v_minus, **given)
 
-    def batches() -> Iterator[tuple[Floats, Floats, Floats, Floats | None]]:
+    def batches() -> Iterator[Batch]:
         for start in range(0, len(vectors[0]), _BATCH):
             chosen = slice(start, start + _BATCH)
             few = masses if len(masses) == 1 else masses[chosen]
@@ -345,28 +342,25 @@ def _refuse_indefinite(masses: Floats, start: int) -> None:
                             "a matrix without negative eigenvalues")
 
 
-def _certificate(batches: Iterable[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike | None]], **known: Any
-                 ) -> Certificate:
-    """Judge impacts in batches of M, v⁻, v⁺ and impulse, and join what else is known of them."""
+def _certificate(batches: Iterable[Batch]) -> Certificate:
+    """Judge impacts in batches of M, v⁻, v⁺ and impulse."""
     judged, largest, momentum, first, shown = [Judged(np.zeros(0, np.bool_), 0, 0)], 0.0, np.nan, -1, ""
-    for mass_matrix, v_minus, v_plus, impulse in batches:
-        given = {"v_plus": v_plus} | ({} if impulse is None else {"impulse": impulse})
-        masses, before, after, *recorded = _impacts(mass_matrix, v_minus, **given)
+    for masses, before, after, recorded in batches:
         done = sum(len(one.gained) for one in judged)
-        judged.append(judge_gains(masses, before, after))
+        judged.append(_judged(masses, before, after))
         for k in np.flatnonzero(judged[-1].gained).tolist():
             one = masses[k % len(masses)], before[k], after[k]
             largest = max(largest, relative_gain(*one))
             first, shown = (first, shown) if first >= 0 else (done + k, _shown(*one))
-        if recorded and len(before):
+        if recorded is not None and len(before):
             with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
                 change = (after - before)[:, :, None]
-                size = np.matmul(np.abs(masses), np.abs(change))[:, :, 0].sum(axis=1) + np.abs(recorded[0]).sum(axis=1)
-                error = np.abs(np.matmul(masses, change)[:, :, 0] - recorded[0]).sum(axis=1)
+                size = np.matmul(np.abs(masses), np.abs(change))[:, :, 0].sum(axis=1) + np.abs(recorded).sum(axis=1)
+                error = np.abs(np.matmul(masses, change)[:, :, 0] - recorded).sum(axis=1)
             momentum = float(np.fmax(momentum, _largest_share(error, size)))
     gained = np.concatenate([one.gained for one in judged])
     return Certificate(len(gained), int(gained.sum()), sum(one.by_integers for one in judged),
-                       sum(one.checked for one in judged), first, largest, momentum, counterexample=shown, **known)
+                       sum(one.checked for one in judged), first, largest, momentum, counterexample=shown)
 
 
 def _largest_share(error: Floats, size: Floats) -> float:
@@ -403,8 +397,10 @@ print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gaine
 def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot decide."""
     table, impacts, scene = run.contacts, run.impacts, scene_from_values(run.scene_resolved)
+    if silent or not len(impacts.step):
+        return np.nan, np.nan
     mechanism, rubbing = mechanism_of(scene), run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
-    if rubbing or silent or scene.contact.self_collision_rows == "per_body":
+    if rubbing or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
     equality = len(values) == 1 and not run.law_settings.get("pushing")

@@ -85,10 +85,10 @@ class _EngineLaw:
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
         """Advance one step by the compiled kernel (see `ContactLaw`)."""
-        world = system.world_under(self)
+        world, step = system.engine_under(self)
         if dt != world.dt:
             raise ArgumentError("dt", dt, f"the step of the scene, {world.dt!r} s; to change it, set the scene's rate")
-        status = system.advance_under(self)(world, state, np.ascontiguousarray(applied_force, np.float64))
+        status = step(world, state, np.ascontiguousarray(applied_force, np.float64))
         if status:
             raise IapbError(STATUS_TEXT[status])
         return copied_step(system, state)

@@ -175,13 +175,6 @@ def coordinate(state, port):
 
 
 @kernel
-def drive_device(world, state, port):
-    """Render F_env (26) and move the device; return False if its motion diverged."""
-    render(world, state, port)
-    return port.coupling == NO_COUPLING or move_device(world, state, port)
-
-
-@kernel
 def render(world, state, port):
     """Write F_env (26) of this step, and the actuator force that renders it."""
     for k in range(port.environment_force.shape[0]):

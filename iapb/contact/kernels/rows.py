@@ -66,9 +66,8 @@ def write_pair_row(world, state, trees, i, direction, out):
     for body in (state.contacts.body_a[i], state.contacts.body_b[i]):
         if body >= 0:
             tree = world.tree_of_body[body]
-            if tree in trees:
-                shift = (half if tree == trees[1] else 0) - world.tree_start[tree]
-                add_body_row(world.mechanism, state.body, body, x, direction, factor, out, shift)
+            shift = (half if tree == trees[1] else 0) - world.tree_start[tree]
+            add_body_row(world.mechanism, state.body, body, x, direction, factor, out, shift)
         factor = -1.0
 
 
