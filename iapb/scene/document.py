@@ -7,6 +7,8 @@ texts, truth values, lists and mappings. Scalars follow YAML 1.2 (``1e-3`` is a 
 from __future__ import annotations
 
 import re
+from ast import literal_eval
+from functools import lru_cache
 from io import StringIO
 from typing import Any
 
@@ -116,20 +118,13 @@ def scalar(text: str) -> Any:
     return float(text) if _FLOAT.fullmatch(text) else text
 
 
-_written: dict[str, str] = {}  # by repr: scenes that differ in a few values share the other fields, of 20 ms
-
-
 def yaml_text(fields: dict[str, Any]) -> str:
     """Return the fields of a scene as YAML; a list or mapping without nested ones is written on one line."""
-    if len(_written) > 1000:
-        _written.clear()
-    for name, value in fields.items():
-        if (key := repr((name, value))) not in _written:
-            _written[key] = _field_text(name, value)
-    return "".join(_written[repr(field)] for field in fields.items())
+    return "".join(_field_text(repr({name: value, "": [[]]})) for name, value in fields.items())
 
 
-def _field_text(name: str, value: Any) -> str:
+@lru_cache(1000)  # scenes that differ in a few values share the other fields, of 20 ms
+def _field_text(field: str) -> str:
     from ruamel.yaml import YAML, SafeRepresenter
 
     class Plain(SafeRepresenter):
@@ -143,5 +138,5 @@ def _field_text(name: str, value: Any) -> str:
     text, yaml = StringIO(), YAML(typ="safe", pure=True)  # type: tuple[StringIO, Any]
     yaml.Representer = Plain
     yaml.default_flow_style, yaml.width, yaml.sort_base_mapping_type_on_output = None, 1_000_000, False
-    yaml.dump({name: value, "": [[]]}, text)  # a nested list, or a single field would be written in braces
+    yaml.dump(literal_eval(field), text)  # with a nested list, or a single field would be written in braces
     return text.getvalue().rpartition('"":')[0]
