@@ -63,16 +63,12 @@ def tell_from_worker(told: Any) -> None:
 
 
 def _listener(begin: Callable[[], None]) -> Any:
-    """Return a numba listener that calls begin() once and adds up the time of compiling, in `duration` once `done`."""
+    """Return a numba listener that calls begin() and adds up the time of compiling, in `duration` once `done`."""
     from numba.core.event import TimingListener
 
     class Listener(TimingListener):
-        told = False
-
         def on_start(self, event: object) -> None:
-            if not self.told:
-                self.told = True
-                begin()
+            begin()
             super().on_start(event)
 
     return Listener()

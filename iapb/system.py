@@ -12,7 +12,7 @@ from iapb.advice.checks import chosen_scene
 from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.compiled import Entry, block, flag
 from iapb.contact.geometry import ContactBuffer, contact_capacity
-from iapb.contact.kernels.broadphase import WORTHWHILE_PAIRS, make_broad_phase
+from iapb.contact.kernels.broadphase import make_broad_phase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.narrow_phase import detect
@@ -130,14 +130,13 @@ class System:
             pushing=flag(law.impulses and law.pushing), impulse_limit=scaled,
             spreading=scaled and law.rendering == "spread",
             contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions", "joint_limits")),
-            broad_phase=len(self.pairs) > WORTHWHILE_PAIRS,
             supports=flag(contact.forces == "implicit" and self.capacity > 1),
         )
         integrator = INTEGRATORS[law.integrator]
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
         world: Any = block(World(
             mechanism=mechanism.block, shapes=self.shapes, pairs=self.pairs,
-            broad_phase=make_broad_phase(self.shapes, self.pairs if switches.broad_phase else self.pairs[:0]),
+            broad_phase=make_broad_phase(self.shapes, self.pairs),
             tree_of_body=mechanism.tree_of_body, tree_start=np.ascontiguousarray(ranges[:, 0]),
             tree_stop=np.ascontiguousarray(ranges[:, 1]), switches=switches, dt=self.dt, gravity=self.gravity,
             **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS}, clamped=contact.penalty == "clamped",

@@ -214,7 +214,7 @@ def step_of_bodies(study: Study, n: int) -> Row:
 def _tested(simulation: Simulation) -> int:
     """Return the number of pairs that the narrow phase tests at the current positions of the bodies."""
     world, body = simulation.world, simulation.state.body
-    if not world.switches.broad_phase:
+    if not world.broad_phase.used:
         return len(world.pairs)
     return int(near_pairs(world.broad_phase, body.rotation, body.position, 0.0))
 

@@ -42,11 +42,12 @@ class BroadPhase(NamedTuple):
     next: Annotated[Integers, "moving"]  # another one in the same bucket, −1 = none
     key: Annotated[Integers, "pair"]
     pairs: Annotated[Indices, "pair 2"]  # output
-    used: Any  # `iapb.compiled.flag`
+    used: Any  # whether there are enough candidate pairs (`iapb.compiled.flag`)
 
 
 def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
-    """Return the broad phase of the candidate pairs (k, 2); without pairs (broad phase off) it is a stub."""
+    """Return the broad phase of the candidate pairs (k, 2); a stub if testing all of them is as fast."""
+    pairs = pairs if len(pairs) > WORTHWHILE_PAIRS else pairs[:0]
     n = len(shapes.kind) if len(pairs) else 0
     moving, static = (np.flatnonzero(each).astype(np.int32) for each in (shapes.body[:n] >= 0, shapes.body[:n] < 0))
     lengths = {"shape": n, "moving": len(moving), "bucket": 1 << (2 * len(moving)).bit_length(),

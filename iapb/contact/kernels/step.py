@@ -128,7 +128,7 @@ def present_contacts(world, state, contacts):
     """Find, cluster and complete the contacts of the present configuration; return how many, -1: too many."""
     R, p, pairs = state.body.rotation, state.body.position, world.pairs
     margin = TOUCHING if world.implicit else 0.0  # all corners of a face that touches, whatever its rounding
-    if world.switches.broad_phase:
+    if world.broad_phase.used:
         near = near_pairs(world.broad_phase, R, p, margin)
         if near < 0:
             return -1

@@ -32,7 +32,6 @@ class Switches(NamedTuple):
     impulse_limit: bool
     spreading: bool
     contacts: bool
-    broad_phase: bool
     joint_damping: bool
     joint_limits: bool
 
@@ -56,7 +55,7 @@ class World(NamedTuple):
     mechanism: MechanismArrays
     shapes: Shapes
     pairs: np.ndarray  # (k, 2) candidate pairs of shapes
-    broad_phase: BroadPhase  # finds the near pairs among them; a stub if testing all pairs is as fast
+    broad_phase: BroadPhase  # finds the near pairs among them
     tree_of_body: np.ndarray  # (n,) int64
     tree_start: np.ndarray  # (t,) first dof of each tree
     tree_stop: np.ndarray  # (t,)
