@@ -88,7 +88,7 @@ def largest_share(impulse, dofs, size, dt, force_limit):
 
 
 @kernel
-def apply_group(world, state, size, share):
+def apply_group(state, size, share):
     """Write the group's new velocity and impulse back; return the kinetic energy it lost [J] and the share applied.
 
     The applied share is `share` unless rounding of the velocity would gain energy (`iapb.contact.kernels.passive`).
@@ -251,7 +251,7 @@ def resolve_island(world, state, island):
         for t in range(world.tree_start.shape[0]):
             if state.island_of_tree[t] == island:
                 state.spreading[t] = share < 1.0
-    lost, applied = apply_group(world, state, size, share)
+    lost, applied = apply_group(state, size, share)
     if applied < share:
         clamp *= applied / share
     for r in range(count):
