@@ -7,7 +7,7 @@ import pytest
 
 from reference.worlds import run_world
 from verification.check import Study
-from verification.claims import CLAIMS, algebraic
+from verification.claims import CLAIMS, algebraic, peg
 from verification.claims.conditions import Condition
 from verification.claims.peg import AVERAGED, INCREASES, RESOLVED, RESOLVED_FORCE, WORLDS, place, trace
 from verification.claims.socket import BOTH, REACH, Socket
@@ -58,12 +58,26 @@ def test_a_coherence_distance_above_speed_times_step_must_also_reach_the_next_fa
     assert short < 1.0 < far
 
 
+STARTS = (Condition(), Condition(0.03, travel=0.02), Condition(0.1, travel=0.02), Condition(0.1, 0.003),
+          Condition(0.1, 0.02), Condition(0.35, 0.02))  # fmt: skip
+
+
+@pytest.mark.thorough
+def test_averages_over_half_and_over_four_times_the_steps_give_the_verdicts_of_the_forces(monkeypatch):
+    study, found = Study(), {}
+    for steps in (AVERAGED, AVERAGED // 2, 4 * AVERAGED):
+        monkeypatch.setattr(peg, "AVERAGED", steps)
+        rows = [row for start in STARTS for row in peg.C11.row(study, start) if row["part"] == peg.CLOSEST]
+        for row in rows:
+            found.setdefault(row["coordinate"], set()).add(peg.C11.holds(row))
+    assert found["x"] == found["y"] == {True} and found["rotation"] <= {None, False}
+
+
 @pytest.mark.thorough
 def test_the_bands_bound_what_a_shorter_step_of_the_ideal_world_changes():
     """The bands are 1 to 3.5 times what the lead of IAPB changes by if the ideal world has four times the rate."""
     study, changes = Study(), []
-    for start in (Condition(), Condition(0.03, travel=0.02), Condition(0.1, travel=0.02), Condition(0.1, 0.003),
-                  Condition(0.1, 0.02), Condition(0.35, 0.02)):  # fmt: skip
+    for start in STARTS:
         ideal, *worlds = (trace(study, start, world) for world in ("ideal", *WORLDS))
         fine = measures.trace_of(run_world(place(study, start).with_values({"rate": 4.0 / ideal.dt}), "ideal"))
         fine = replace(fine, device=fine.device[::4], device_force=fine.device_force.reshape(-1, 4, 3).mean(axis=1))
