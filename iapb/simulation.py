@@ -35,7 +35,8 @@ from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
 from iapb.recording import Recorder, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.system import System, system_of, wrenches_of
+from iapb.scene.mechanism import wrench_of
+from iapb.system import System, system_of
 from iapb.worlds import find_world
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
@@ -147,7 +148,7 @@ class Simulation:
         """Do the first half of a step: apply hand and coupling, advance the law, send the device its force."""
         world, state, port = self.world, self.state, self.port
         if self._planned:
-            port.wrench[:] = wrenches_of(self.scene, [self.time])[0]
+            port.wrench[:] = wrench_of(self.scene, self.time)
         self._couple(world, state, port)
         if self.compiled:
             status = self._advance(world, state, port.applied)
@@ -245,7 +246,7 @@ class Simulation:
         self.port.planned[:steps] = self.port.wrench
         for k in range(steps if self._planned else 0):
             try:
-                self.port.planned[k] = wrenches_of(self.scene, [(self.steps_done + k) * self.system.dt])[0]
+                self.port.planned[k] = wrench_of(self.scene, (self.steps_done + k) * self.system.dt)
             except IapbError as stop:
                 return k, stop
         return steps, None

@@ -32,7 +32,7 @@ from iapb.mechanics.structure import make_free_motion
 from iapb.run import ImpactTable
 from iapb.scene import Scene, SpatialScene
 from iapb.scene import mechanism as scene_parts
-from iapb.schema import Floats, blank, quantities, zeros_of
+from iapb.schema import blank, quantities, zeros_of
 
 _factored = Entry(cholesky)
 
@@ -231,7 +231,7 @@ class System:
             port.device_mass[:] = device.mass_matrix(port.device_q)
             _factored(port.device_mass, port.device_lower)
             port.hand_point[: len(hand.point)] = hand.point
-            port.wrench[:] = wrenches_of(scene, [0.0])[0]
+            port.wrench[:] = scene_parts.wrench_of(scene, 0.0)
         return block(port)
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
@@ -264,13 +264,3 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
     if gains is None:
         raise ArgumentError("coupling", name, f"a scene with couplings.{field}; {scene.name} gives no gains for it")
     return kinds[name](tuple(gains.stiffness), tuple(gains.damping))
-
-
-def wrenches_of(scene: Scene, times: Sequence[float]) -> Floats:
-    """Return force and torque (n, 6) of the scene's hand at n times [s] in world axes; zeros without a hand."""
-    if scene.hand is None:
-        return np.zeros((len(times), 6))
-    forces = np.array(scene.hand.forces(times))
-    wrenches = np.zeros((len(forces), 6))
-    wrenches[:, [0, 1, 5] if forces.shape[1] == 3 else slice(None)] = forces
-    return wrenches

@@ -35,7 +35,8 @@ from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene
-from iapb.system import System, wrenches_of
+from iapb.scene.mechanism import wrench_of
+from iapb.system import System
 from reference import Floats
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
@@ -153,7 +154,7 @@ class _Motion:
         if hand is None:
             return np.zeros(mechanics.nv)
         axes, _, rows = (found[mechanics.index(hand.body)] for found in mechanics.bodies(q))
-        moved, wrench = at_lever(rows, axes @ np.array([*hand.point, 0.0])[:3]), wrenches_of(self.scene, [0.0])[0]
+        moved, wrench = at_lever(rows, axes @ np.array([*hand.point, 0.0])[:3]), wrench_of(self.scene, 0.0)
         return np.asarray(moved.T @ wrench[:3] + rows[3:].T @ wrench[3:], np.float64)
 
     def _pull(self, distance: Floats, speed: Floats) -> Floats:

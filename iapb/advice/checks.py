@@ -149,11 +149,10 @@ class Start:
     def applied(self, q: Floats) -> Floats:
         """Generalized force (d,) at q of gravity and of the hand's force at t = 0."""
         force, hand = -self.mechanism.gravity(q, self.gravity), self.scene.hand
-        pushes = hand.forces([0.0])[0] if hand is not None else []
-        if hand is not None and any(pushes):
+        wrench = mechanism.wrench_of(self.scene, 0.0)
+        if hand is not None and wrench.any():
             body = self.mechanism.index(hand.body)
             R, p = self.mechanism.placements(q)
-            wrench = np.array([*pushes[:2], 0.0, 0.0, 0.0, pushes[2]] if len(pushes) == 3 else pushes)
             point = p[body] + R[body] @ np.array([*hand.point, 0.0][:3])
             force += wrench[:3] @ self.mechanism.point_jacobian(q, body, point)
             force += wrench[3:] @ self.mechanism.frame_jacobian(q, body)[3:]
@@ -502,7 +501,9 @@ def chosen_scene(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
         scene = scene.with_values({"contact.auto": False} | {f"contact.{name}": x for name, x in choice.items()})
     elif scene.chosen_fields:
         choice, said = _firm(scene)
-        scene = scene.model_copy(update={"contact": scene.contact.choosing(choice)})
+        contact = scene.contact.model_copy(update=choice)
+        contact._chosen = tuple(choice)
+        scene = scene.model_copy(update={"contact": contact})
     return scene, said
 
 

@@ -65,6 +65,13 @@ def start_of(scene: Scene) -> tuple[Floats, Floats]:
     return np.array(q, np.float64), np.array(v, np.float64)
 
 
+def wrench_of(scene: Scene, time: float) -> Floats:
+    """Return force and torque (6,) of the scene's hand at a time [s] in world axes; zeros without a hand."""
+    wrench, force = np.zeros(6), scene.hand.force_at(time) if scene.hand is not None else [0.0] * 6
+    wrench[[0, 1, 5] if len(force) == 3 else slice(None)] = force
+    return wrench
+
+
 def joint_damping_of(scene: Scene) -> Floats:
     """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
     given = [body.joint_damping or (0.0,) * KINDS[body.joint].nv for body in scene.bodies]

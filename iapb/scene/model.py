@@ -102,12 +102,6 @@ class Contact(ScenePart):
         """Fields whose values the toolkit has chosen."""
         return self._chosen
 
-    def choosing(self, values: Mapping[str, float]) -> Self:
-        """Return a copy with values that the toolkit has chosen."""
-        made = self.model_copy(update=dict(values))
-        made._chosen = tuple(values)
-        return made
-
 
 _WORDS: dict[Any, Any] = {"auto": {"auto": True}, "paper": {"forces": "paper"}}
 _SHORT = BeforeValidator(lambda given: _WORDS.get(given, given) if isinstance(given, str) else given,
@@ -148,28 +142,26 @@ class Hand(ScenePart):
         """Whether the force changes over time."""
         return bool(self.force_table or self.force_function)
 
-    def forces(self, times: Iterable[float]) -> list[list[float]]:
-        """Return the force at times [s].
+    def force_at(self, time: float) -> list[float]:
+        """Return the force at a time [s].
 
         Raises
         ------
         IapbError
-            An expression has no finite value at one of the times.
+            An expression has no finite value at this time.
         """
-        functions = [function_of(text) for text in self.force_function]
-        found = []
-        for t in times:
-            force = list(self.force)
-            if self.force_table:
-                force = [a + b for a, b in zip(force, _between(self.force_table, t), strict=True)]
-            found.append([a + f(t) for a, f in zip(force, functions, strict=True)] if functions else force)
-        return found
+        force = list(self.force)
+        if self.force_table:
+            force = [a + b for a, b in zip(force, _between(self.force_table, time), strict=True)]
+        if self.force_function:
+            force = [a + function_of(text)(time) for a, text in zip(force, self.force_function, strict=True)]
+        return force
 
     def largest_force(self, duration: float = 0.0) -> float:
         """Return the magnitude of the largest force [N] at t = 0, at the table's times and 200 times of a function."""
         times = [0.0, *(row[0] for row in self.force_table)]
         times += [k * duration / 200.0 for k in range(201)] if self.force_function else []
-        return max(math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in self.forces(times))
+        return max(math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in map(self.force_at, times))
 
 
 def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:

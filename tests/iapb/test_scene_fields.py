@@ -49,7 +49,7 @@ def pushed(**values: Any) -> Scene:
 
 
 def test_a_table_is_linear_between_its_rows_and_constant_outside() -> None:
-    forces = np.array(pushed(**{"hand.force_table": TABLE}).hand.forces([0.0, 0.1, 0.15, 0.2, 0.3, 0.4, 9.0]))
+    forces = np.array([*map(pushed(**{"hand.force_table": TABLE}).hand.force_at, [0.0, 0.1, 0.15, 0.2, 0.3, 0.4, 9.0])])
     expected = [[0, 0, 0], [0, 0, 0], [0.5, -1, 0.05], [1, -2, 0.1], [2, -1, 0.05], [3, 0, 0], [3, 0, 0]]
     assert np.allclose(forces, expected, rtol=1e-14, atol=1e-15)
 
@@ -57,7 +57,7 @@ def test_a_table_is_linear_between_its_rows_and_constant_outside() -> None:
 def test_the_record_has_the_force_of_each_steps_start_and_steps_alone_give_the_same_bits() -> None:
     scene = pushed(**{"hand.force_table": TABLE, "hand.force_function": ["0.1*sin(2*pi*t)", 0, "step(t - 0.5)/100"]})
     run, alone = simulate(scene, ImpulseAugmented()), Simulation(scene)
-    expected = np.array(scene.hand.forces(run.time[:-1]))
+    expected = np.array([*map(scene.hand.force_at, run.time[:-1].tolist())])
     assert np.array_equal(run.hand_force, expected)  # the peg's coordinates are the hand's axes; three chunks
     states = np.array([alone.step().q for _ in range(700)])
     assert np.array_equal(states, run.q[1:701])

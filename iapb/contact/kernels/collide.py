@@ -149,18 +149,6 @@ def gather_tangents(world, state, size, count):
 
 
 @kernel
-def swap_rows(state, size, i, j):
-    """Exchange two rows of an impact."""
-    work = state.work
-    for k in range(size):
-        work.rows[k, i], work.rows[k, j] = work.rows[k, j], work.rows[k, i]
-    work.length[i], work.length[j] = work.length[j], work.length[i]
-    for each in (state.row_restitution, state.row_impulse, state.friction_work.least):
-        each[i], each[j] = each[j], each[i]
-    state.rows[i], state.rows[j] = state.rows[j], state.rows[i]
-
-
-@kernel
 def keep_together(state, size, count):
     """Put the rows first that push, or that meet −e γ⁻ after Poisson's law; return how many. The others open.
 
@@ -176,7 +164,11 @@ def keep_together(state, size, count):
         due = -state.row_restitution[r] * before
         least[r] = min(after, max(due, 0.0))
         if state.row_impulse[r] > 0.0 or after - due <= opens:
-            swap_rows(state, size, kept, r)
+            for k in range(size):
+                work.rows[k, kept], work.rows[k, r] = work.rows[k, r], work.rows[k, kept]
+            for each in (work.length, state.row_restitution, state.row_impulse, least):
+                each[kept], each[r] = each[r], each[kept]
+            state.rows[kept], state.rows[r] = state.rows[r], state.rows[kept]
             kept += 1
     for k in range(size):
         for r in range(kept):
