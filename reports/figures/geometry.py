@@ -39,9 +39,6 @@ class Placement:
     rotation: Floats
     origin: Floats
 
-    def __matmul__(self, inner: Placement) -> Placement:
-        return Placement(self.rotation @ inner.rotation, self.origin + self.rotation @ inner.origin)
-
     def of(self, points: Any) -> Floats:
         """Return points (..., 2 or 3) of this frame in world axes, in the same shape."""
         points = np.asarray(points, dtype=float)
@@ -49,14 +46,10 @@ class Placement:
         return self.origin[:n] + points @ self.rotation[:n, :n].T
 
 
-def placement(origin: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0)) -> Placement:
-    """Return the frame at `origin` (2 or 3 numbers), rotated by roll, pitch and yaw."""
-    return Placement(Rotation.from_euler("xyz", rpy).as_matrix(), np.resize(np.append(origin, 0.0), 3))
-
-
 def placement_of(shape: Mapping[str, Any]) -> Placement:
     """Return the frame of a shape of a resolved scene, from its `angle` (plane) or its `rpy` (space)."""
-    return placement(shape.get("center", (0.0, 0.0)), shape.get("rpy", (0.0, 0.0, shape.get("angle", 0.0))))
+    turn = Rotation.from_euler("xyz", shape.get("rpy", (0.0, 0.0, shape.get("angle", 0.0))))
+    return Placement(turn.as_matrix(), np.resize([*shape.get("center", (0.0, 0.0)), 0.0], 3))
 
 
 def body_placements(scene: Mapping[str, Any], pose: Floats | None = None) -> dict[str, Placement]:
@@ -204,7 +197,7 @@ def solids(scene: Mapping[str, Any], size: float | None = None) -> Iterator[Soli
 
 def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
     """Return the lower and upper corner (3,) [m] of all bounded shapes in the initial state."""
-    places = {"": placement(), **body_placements(scene)}
+    places = {"": placement_of({}), **body_placements(scene)}
     bounded = solids({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0)
     every = np.vstack([place.origin for name, place in places.items() if name]
                       + [places[solid.body].of(solid.vertices) for solid in bounded])  # fmt: skip
