@@ -236,6 +236,7 @@ def test_debug_shows_the_traceback_ctrl_c_ends_with_130_and_a_fault_of_ours_is_n
         iapb("schema")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("of_ctrl_c", [signal.SIG_DFL, signal.SIG_IGN], ids=["in front", "in the background"])
 def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(of_ctrl_c, tmp_path):
     command = [sys.executable, "-m", "reports.cli", "live", "peg_corner", "--seconds", "600", "--out", str(tmp_path)]

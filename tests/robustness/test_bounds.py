@@ -24,6 +24,7 @@ from verification.laws.scenes import draw_scene, draw_spatial_scene
 
 COUNT = {"quick": 25, "deep": 1000}[os.environ.get("IAPB_HYPOTHESIS_PROFILE", "quick")]
 STEPS = 8
+pytestmark = pytest.mark.thorough
 JOINTS = {True: ("continuous", "spherical", "free_flyer", "free_flyer", "prismatic", "revolute"),
           False: ("planar", "planar", "prismatic", "revolute")}  # by whether the scene is in space
 
