@@ -14,7 +14,7 @@ import numpy as np
 from iapb.errors import MissingDependencyError
 from reference import Floats
 from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
-from reference.complementarity.solution import SOLVED_TOLERANCE, Residuals, Solution, velocity_scale
+from reference.complementarity.solution import Residuals, Solution, velocity_scale
 from reference.complementarity.solvers import solve, solver_names
 
 
@@ -41,41 +41,34 @@ class SolverRow:
 
 
 def run_solvers(
-    problems: Iterable[ImpactProblem], solvers: Sequence[str] | None = None, *,
-    tolerance: float = SOLVED_TOLERANCE, repeats: int = 1, longest: float = np.inf,
-    slow: dict[str, float] | None = None, progress: Callable[[str, str], None] | None = None,
+    problem: ImpactProblem, solvers: Iterable[str] | None = None, longest: float = np.inf,
+    slow: dict[str, float] | None = None, progress: Callable[[], object] = lambda: None,
 ) -> list[SolverRow]:
-    """Solve every problem with every solver of its kind (or with `solvers`); the time is the least of `repeats`.
+    """Solve a problem with every solver of its kind, or with `solvers`.
 
-    A solver that needs more than `longest` [s] for one problem is left out afterwards, so give the smallest problems
-    first. `slow` keeps such solvers and their times between calls.
+    A solver that needs more than `longest` [s] is added to `slow` with its time. The solvers in `slow` are left out, so
+    give the smallest problems first. `progress` is called before each solver starts.
     """
-    rows: list[SolverRow] = []
+    asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
     slow = {} if slow is None else slow
-    for problem in problems:
-        asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
-        found: list[Solution] = []
-        missing: list[SolverRow] = []
-        left_out: list[SolverRow] = []
-        for name in solvers or solver_names(problem):
-            row = partial(SolverRow, problem.name, problem.size, name, asymmetry)
-            if name in slow:
-                left_out.append(row("left out", f"left out: {slow[name]:.3g} s for a problem before"))
-                continue
-            if progress is not None:
-                progress(problem.name, name)
-            try:
-                found.append(min((solve(problem, name) for _ in range(repeats)), key=lambda s: s.seconds))
-            except MissingDependencyError as error:
-                missing.append(row("missing", str(error)))
-        best = min(found, key=lambda s: s.residuals.worst, default=None)
-        for s in found:
-            apart = np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0) if best and s.solved(tolerance) else np.nan
-            rows.append(SolverRow(problem.name, problem.size, s.solver, asymmetry, s.verdict(tolerance), s.note,
-                                  s.residuals, s.seconds, float(apart / velocity_scale(problem))))  # fmt: skip
-        rows += missing + left_out
-        slow.update({s.solver: s.seconds for s in found if s.seconds > longest})
-    return rows
+    found, missing, left_out = list[Solution](), list[SolverRow](), list[SolverRow]()
+    for name in solvers or solver_names(problem):
+        row = partial(SolverRow, problem.name, problem.size, name, asymmetry)
+        if name in slow:
+            left_out.append(row("left out", f"left out: {slow[name]:.3g} s for a problem before"))
+            continue
+        progress()
+        try:
+            found.append(solve(problem, name))
+        except MissingDependencyError as error:
+            missing.append(row("missing", str(error)))
+    best, rows = min(found, key=lambda s: s.residuals.worst, default=None), list[SolverRow]()
+    for s in found:
+        apart = np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0) if best and s.solved() else np.nan
+        rows.append(SolverRow(problem.name, problem.size, s.solver, asymmetry, s.verdict(), s.note, s.residuals,
+                              s.seconds, float(apart / velocity_scale(problem))))  # fmt: skip
+    slow.update({s.solver: s.seconds for s in found if s.seconds > longest})
+    return rows + missing + left_out
 
 
 def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str, Floats]:

@@ -118,15 +118,19 @@ def pulling_share(contact_jacobian: ArrayLike, generalized_impulse: ArrayLike, m
     SolverError
         The least-squares iteration does not converge.
     """
-    from scipy.optimize import nnls
-
     rows, given = np.asarray(contact_jacobian, np.float64), np.asarray(generalized_impulse, np.float64)
     if rows.ndim != 2 or rows.shape[1:] != given.shape:
         raise ArgumentError("contact_jacobian", rows.shape, f"{len(given)} columns, as generalized_impulse")
     cholesky = np.linalg.cholesky(np.asarray(mass_matrix, np.float64))
-    columns, goal = np.linalg.solve(cholesky, rows.T), np.linalg.solve(cholesky, given)
+    return unpushed_share(np.linalg.solve(cholesky, rows.T), np.linalg.solve(cholesky, given))
+
+
+def unpushed_share(columns: np.ndarray, goal: np.ndarray) -> float:
+    """Return the least |columns @ p − goal| / |goal| over all p >= 0; 0 if the goal is 0."""
+    from scipy.optimize import nnls
+
     size, length = float(np.linalg.norm(goal)), np.linalg.norm(columns, axis=0)
-    if size == 0.0 or len(rows) == 0:
+    if size == 0.0 or len(length) == 0:
         return 0.0 if size == 0.0 else 1.0
     unit = np.where(length > 0.0, length, 1.0)
     try:

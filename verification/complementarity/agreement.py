@@ -28,7 +28,7 @@ import numpy as np
 
 from iapb import resolve_impact
 from iapb.scene import scene_names
-from reference.complementarity.laws import ADHESIVE, ARTEFACT, adhesion, newton_lcp
+from reference.complementarity.laws import ADHESIVE, ARTEFACT, adhesion, newton_lcp, unpushed_share
 from reference.complementarity.problem import ImpactProblem
 from verification.check import Check, Study
 from verification.complementarity.families import FAMILIES, random_cases, two_contacts
@@ -84,7 +84,8 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
     speed = float(np.linalg.norm(before)) or 1.0
     total, scale = float(np.abs(p).sum()), float(np.abs(problem.gamma_minus).max(initial=0.0)) or 1.0
     rows = case.contact_jacobian if case.touching is None else np.vstack([case.contact_jacobian, case.touching])
-    distance, cone = float(np.linalg.norm(upper @ (v - law))) / speed, _cone_distance(problem.factor, change) / speed
+    distance = float(np.linalg.norm(upper @ (v - law))) / speed
+    cone = unpushed_share(problem.factor.T, change) * float(np.linalg.norm(change)) / speed
     extra = _lost(before, change) - _lost(before, upper @ (law - case.velocity))
     near, far = sorted((distance, cone))
     return {
@@ -104,18 +105,6 @@ def _lost(before: np.ndarray, change: np.ndarray) -> float:
     """Return (KE⁻ − KE⁺) / KE⁻, computed from the change of velocity to avoid cancellation."""
     energy = 0.5 * float(before @ before)
     return -float(before @ change + 0.5 * change @ change) / energy if energy > 0.0 else 0.0
-
-
-def _cone_distance(rows: np.ndarray, change: np.ndarray) -> float:
-    """Return the distance of a change of velocity from {Aᵀp : p >= 0}, by non-negative least squares on unit rows."""
-    from scipy.optimize import nnls
-
-    size = float(np.linalg.norm(change))
-    if not len(rows) or size == 0.0:
-        return size
-    length = np.linalg.norm(rows, axis=1)
-    unit = rows / np.where(length > 0.0, length, 1.0)[:, None]
-    return float(nnls(unit.T, change / size)[1]) * size
 
 
 def _outside(rows: np.ndarray, change: np.ndarray) -> float:

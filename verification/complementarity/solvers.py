@@ -70,11 +70,11 @@ def study_read(
     with one_thread():
         for friction in {stored.problem.friction is not None for stored in problems}:  # imports and compiles, untimed
             size = 3 if friction else 1
-            run_solvers([ImpactProblem.from_delassus(np.eye(size), -np.eye(size)[0], 0.0, 0.5 if friction else None)])
+            run_solvers(ImpactProblem.from_delassus(np.eye(size), -np.eye(size)[0], 0.0, 0.5 if friction else None))
         for problem in sorted((stored.problem for stored in problems), key=lambda problem: problem.size):
             rows += attempt(problem.name, partial(
-                run_solvers, [problem], longest=longest, slow=slow,
-                progress=lambda *_: say(stage, next(begun), pairs)), failures) or []
+                run_solvers, problem, longest=longest, slow=slow,
+                progress=lambda: say(stage, next(begun), pairs)), failures) or []
     say(stage, pairs, pairs)
     names, kinds, lines = dict.fromkeys(row.solver for row in rows), dict[str, list[SolverRow]](), list[Row]()
     for stored in problems:

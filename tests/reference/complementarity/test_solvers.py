@@ -211,7 +211,8 @@ STACK = ImpactProblem.from_impact(np.eye(2), [[1.0, 0.0], [-1.0, 1.0], [-1.0, 1.
 def test_every_pair_has_a_verdict_and_velocities_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     asymmetric = ImpactProblem.from_delassus([[1.0, 0.0], [2.0, 1.0]], [-1.0, -1.0], name="asymmetric")
     monkeypatch.setitem(SOLVERS, "absent", SolverEntry("nowhere", "not_a_package", "", "lcp"))
-    rows = run_solvers([STACK, asymmetric], ["daqp", "gauss_seidel", "nsgs", "absent"])
+    rows = [row for problem in (STACK, asymmetric)
+            for row in run_solvers(problem, ["daqp", "gauss_seidel", "nsgs", "absent"])]  # fmt: skip
     verdicts = {(row.problem, row.solver): row.verdict for row in rows}
     assert verdicts["stack", "daqp"] == verdicts["stack", "gauss_seidel"] == "solved"
     assert verdicts["asymmetric", "daqp"] == "refused" and verdicts["stack", "nsgs"] == "refused"
