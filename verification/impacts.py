@@ -18,6 +18,12 @@ from reference.exact import exact_impact
 Floats = NDArray[np.floating[Any]]
 EPS = float(np.finfo(float).eps)
 
+
+def over(value: Floats, scale: Floats) -> Floats:
+    """value / scale; where the scale is 0, a value above 0 gives infinity, any other 0."""
+    return np.divide(value, scale, out=np.where(value > 0.0, np.inf, 0.0), where=scale > 0.0)
+
+
 # Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly motion. A correct
 # resolver may treat them as either, so laws that compare velocities skip such impacts.
 ROUNDING_BELOW, MOTION_ABOVE = 1e-13, 1e-5
@@ -174,6 +180,11 @@ class ImpactCase:
         """Distance between two velocities in the kinetic metric, relative to |u|."""
         length = float(np.linalg.norm(self.lower.T @ (one - other)))
         return length / self.speed if self.speed > 0.0 else (0.0 if length == 0.0 else np.inf)
+
+    def unmet_restitution(self, v_plus: Floats) -> float:
+        """max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); zero rows give 0, and a system at rest must stay at rest."""
+        unmet = np.abs(self.contact_jacobian @ v_plus + self.restitution * (self.contact_jacobian @ self.velocity))
+        return float(np.max(over(unmet, np.linalg.norm(self.rows, axis=1) * self.speed), initial=0.0))
 
     @cached_property
     def _answers(self) -> dict[int, Any]:

@@ -163,16 +163,9 @@ def _quality(problem: ImpactCase, v_plus: Any) -> Row:
         "relative error": float(np.linalg.norm(problem.lower.T @ error)) / problem.speed,
         # a loss with e < 1 is correct, so it is no error
         "relative energy gain": max(relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus), 0.0),
-        "restitution residual": _residual(problem, v_plus),
+        "restitution residual": problem.unmet_restitution(v_plus),
     }
     return {name: value if math.isfinite(value) else None for name, value in found.items()}
-
-
-def _residual(case: ImpactCase, v_plus: Floats) -> float:
-    """Return max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|)."""
-    J, v = case.contact_jacobian, case.velocity
-    return float(np.max(np.abs(J @ v_plus + case.restitution * (J @ v)) / (
-        np.linalg.norm(case.rows.T, axis=0) * case.speed)))
 
 
 MEASURED = ("time [µs]", "quartiles [µs]", "relative error", "relative energy gain", "restitution residual",
@@ -361,7 +354,7 @@ def stopped(study: Study, case: Stopped) -> Row:
         mass, rows, v = one.arrays
         v_plus = resolve_impact(mass, rows, v, 0.0, budget=budget).velocity
         full = resolve_impact(mass, rows, v, 0.0).velocity
-        residuals.append(_residual(one, v_plus))
+        residuals.append(one.unmet_restitution(v_plus))
         gains.append(relative_energy_gain(mass, v, v_plus))
         before, after, least = (0.5 * float(w @ mass @ w) for w in (v, v_plus, full))
         lost.append((before - after) / (before - least))

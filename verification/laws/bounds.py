@@ -118,11 +118,6 @@ def relative_gain(mass: Floats, before: Floats, after: Floats) -> float:
     return float(gain[0]) if np.isfinite(bound[0]) else np.inf
 
 
-def over(value: Floats, scale: Floats) -> Floats:
-    """value / scale; where the scale is 0, a value above 0 gives infinity, any other 0."""
-    return np.divide(value, scale, out=np.where(value > 0.0, np.inf, 0.0), where=scale > 0.0)
-
-
 @dataclass(frozen=True)
 class Bounds:
     """Tolerances for a resolver.

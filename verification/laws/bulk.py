@@ -22,8 +22,7 @@ from iapb.linalg import cholesky
 from iapb.schema import zeros_of
 from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
-from verification.impacts import ANY_RANK, EPS, Floats, Impacts, draw_impacts
-from verification.laws.bounds import over
+from verification.impacts import ANY_RANK, EPS, Floats, Impacts, draw_impacts, over
 from verification.methods import COMPARED
 from verification.table import HOLDS, Row
 

@@ -33,6 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from iapb.advice import certificate
+from reference.complementarity.solution import project_on_cone
 from verification.impacts import (
     Floats,
     ImpactCase,
@@ -124,7 +125,7 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     return _descend(blocks, friction, target, push)
 
 
-def _descend(blocks: Floats, friction: Floats, target: Floats, p: Floats) -> float:
+def _descend(blocks: Floats, friction: np.ndarray, target: Floats, p: Floats) -> float:
     """Return the least |Aᵀp − target| that steps from p (c, 1 + m) find, inside the cones, or NaN.
 
     With r = target − Aᵀp, no p' has a remainder below (target·r − max over p' of p'·(A r)) / |r|. The search ends when
@@ -136,7 +137,7 @@ def _descend(blocks: Floats, friction: Floats, target: Floats, p: Floats) -> flo
     length, moved, pace = 1.0 / max(float(np.linalg.norm(rows, 2)) ** 2, 1.0), p, 1.0
     nearest = np.inf
     for _ in range(_STEPS):
-        tried = _inside(moved + length * (rows @ (target - moved.ravel() @ rows)).reshape(p.shape), friction)
+        tried = project_on_cone(moved + length * (rows @ (target - moved.ravel() @ rows)).reshape(p.shape), friction)
         rest = target - tried.ravel() @ rows
         nearest = min(nearest, float(np.linalg.norm(rest)))
         gained = (rows @ rest).reshape(p.shape)
@@ -148,15 +149,6 @@ def _descend(blocks: Floats, friction: Floats, target: Floats, p: Floats) -> flo
         faster = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * pace * pace))
         moved, p, pace = tried + (pace - 1.0) / faster * (tried - p), tried, faster
     return float("nan")
-
-
-def _inside(p: Floats, friction: Floats) -> Floats:
-    """Return the closest impulses (c, 1 + m) inside the cones |p_t| ≤ μ p."""
-    along = np.linalg.norm(p[:, 1:], axis=1)
-    inside = (along <= friction * p[:, 0]) & (p[:, 0] >= 0.0)
-    normal = np.where(inside, p[:, 0], np.maximum(0.0, (p[:, 0] + friction * along) / (1.0 + friction**2)))
-    share = np.where(inside, 1.0, friction * normal / np.where(along > 0.0, along, 1.0))
-    return np.concatenate([normal[:, None], share[:, None] * p[:, 1:]], axis=1)
 
 
 @law(UNILATERAL_LAWS, "no_penetration", "γ⁺ ≥ min(0, −e γ⁻): no contact is left approaching")

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from verification.impacts import EPS, Floats, ImpactCase
-from verification.laws.bounds import Bounds, Found, Law, law, over, relative_gain
+from verification.laws.bounds import Bounds, Found, Law, law, relative_gain
 from verification.laws.resolver import Resolver, outcome, own_answer, own_outcome
 
 LAWS: dict[str, Law] = {}
@@ -35,12 +35,6 @@ def kinetic_energy_never_rises(case: ImpactCase, resolver: Resolver, bounds: Bou
     return relative_gain(case.mass_matrix, case.velocity, own_outcome(resolver, case)), bounds.energy_gain(case)
 
 
-def restitution_residual(case: ImpactCase, v_plus: Floats) -> float:
-    """Return max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); zero rows give 0, and a system at rest must stay at rest."""
-    unmet = np.abs(case.contact_jacobian @ v_plus + case.restitution * (case.contact_jacobian @ case.velocity))
-    return float(np.max(over(unmet, np.linalg.norm(case.rows, axis=1) * case.speed), initial=0.0))
-
-
 @law(LAWS, "restitution", "J v⁺ = −e J v⁻ on every row")
 def restitution_is_met(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """(15), dependent rows included: max |Jᵢv⁺ + e Jᵢv⁻| / ‖Aᵢ‖, relative to max |Jᵢv⁻| / ‖Aᵢ‖, or |u| if this is 0.
@@ -51,7 +45,7 @@ def restitution_is_met(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
     which of these rows it uses; the limit is then `bounds.restitution`, relative to |u|.
     """
     v_plus = own_outcome(resolver, case)
-    unmet = restitution_residual(case, v_plus)
+    unmet = case.unmet_restitution(v_plus)
     if case.speed == 0.0 or case.contacts == 0:
         return unmet, bounds.restitution
     seen = float(np.max(np.abs(case.unit_rows @ case.u))) / case.speed

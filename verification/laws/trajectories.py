@@ -18,8 +18,8 @@ from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.system import System
 from reference import Floats
-from verification.impacts import EPS
-from verification.laws.bounds import FACTORED, Found, Law, LawResidual, law, over, relative_gain
+from verification.impacts import EPS, over
+from verification.laws.bounds import FACTORED, Found, Law, LawResidual, law, relative_gain
 
 TRAJECTORY_LAWS: dict[str, Law] = {}
 BY_THE_ENGINE = ("impulse-augmented penalty", "penalty")
