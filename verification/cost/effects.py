@@ -10,9 +10,9 @@ whole run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -37,27 +37,15 @@ ROUNDS = 9  # number of rounds; each loop runs once per round
 SAMPLES = 400  # number of instants at which positions are compared
 
 
-@dataclass(frozen=True)
-class Variant:
-    """A variant of a scene: changed values and switches, without impulses or coupling, or without a kind of pairs."""
-
-    values: Mapping[str, Any] = field(default_factory=dict)
-    impulses: bool = True
-    coupled: bool = True
-    switches: tuple[str, ...] = ()
-    on: bool = False  # the new value of the switches
-    untouched: str = ""
-
-
-LEFT_OUT: dict[str, Variant] = {
-    **{name: Variant(switches=(name,)) for name in
+LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene without it, see `Loop`
+    **{name: {"switches": (name,)} for name in
        ("varying_inertia", "velocity_terms", "joint_damping", "joint_limits", "unequal_restitution")},
-    "hand_force": Variant({"hand.force": None, "hand.force_table": (), "hand.force_function": ()}),
-    "wall_contacts": Variant(untouched="wall"),
-    "body_contacts": Variant(untouched="body"),
-    "impulses": Variant(impulses=False),
-    "coupling": Variant(coupled=False),
-    **{name: Variant({path: value}) for name, path, value in (
+    "hand_force": {"values": {"hand.force": None, "hand.force_table": (), "hand.force_function": ()}},
+    "wall_contacts": {"untouched": "wall"},
+    "body_contacts": {"untouched": "body"},
+    "impulses": {"impulses": False},
+    "coupling": {"coupled": False},
+    **{name: {"values": {path: value}} for name, path, value in (
         ("gravity", "gravity", None),
         ("self_collisions", "contact.self_collisions", False),
         ("penalty_stiffness", "contact.stiffness", 0.0),
@@ -123,8 +111,8 @@ def effects_of(
     """
     chosen = find_world(world)
     effects = decide_effects(scene, chosen.law, chosen.coupling_in(scene))
-    whole = Loop(scene, chosen, Variant())
-    tried: dict[str, Any] = {_ALL_ON: _loop(scene, chosen, Variant(switches=SWITCHED, on=True))}
+    whole = Loop(scene, chosen)
+    tried: dict[str, Any] = {_ALL_ON: _loop(scene, chosen, {"switches": SWITCHED, "on": True})}
     for effect in effects:
         if effect.active and effect.name in LEFT_OUT:
             loop = partial(_loop, scene, chosen, LEFT_OUT[effect.name])
@@ -143,10 +131,10 @@ def effects_of(
         timed=(*steps, "time saved", "cost"), prose=("reason", "left out", "cost", "change"))  # fmt: skip
 
 
-def _loop(scene: Scene, world: World, variant: Variant) -> Loop | IapbError:
+def _loop(scene: Scene, world: World, variant: Mapping[str, Any]) -> Loop | IapbError:
     """Return the loop after its first run, or the error that stopped this run."""
     try:
-        loop = Loop(scene, world, variant)
+        loop = Loop(scene, world, **variant)
         loop.sample()
     except IapbError as error:
         return error
@@ -230,21 +218,25 @@ def _farthest(one: Floats, other: Floats) -> float | None:
 
 
 class Loop(RecordedLoop):
-    """The simulation loop of a variant of a scene."""
+    """The simulation loop of a scene, or of a variant of it: with other values, without impulses or coupling, with
+    some switches turned on or off, or with the pairs of a kind (see `_leave_out_pairs`) untouched."""
 
-    def __init__(self, scene: Scene, world: World, variant: Variant) -> None:
+    def __init__(
+        self, scene: Scene, world: World, *, values: Mapping[str, Any] = MappingProxyType({}), impulses: bool = True,
+        coupled: bool = True, switches: Iterable[str] = (), on: bool = False, untouched: str = "",
+    ) -> None:  # fmt: skip
         force = [0.0] * len(scene.hand.force) if scene.hand is not None else None  # zeros instead of a hand force
-        values = {name: force if name == "hand.force" else value for name, value in variant.values.items()}
+        values = {name: force if name == "hand.force" else value for name, value in values.items()}
         changed = scene.with_values(values) if values else scene
-        law = world.law if variant.impulses else Penalty()
-        coupling = world.coupling_in(changed) if variant.coupled else NoCoupling()
+        law = world.law if impulses else Penalty()
+        coupling = world.coupling_in(changed) if coupled else NoCoupling()
         super().__init__(Simulation(changed, law, coupling), scene.steps)
-        if variant.untouched:
-            _leave_out_pairs(self.simulation, variant.untouched)
-        if variant.switches:
+        if untouched:
+            _leave_out_pairs(self.simulation, untouched)
+        if switches:
             given = self.simulation.world
-            switches = engine.Switches(**given.switches.members | dict.fromkeys(variant.switches, variant.on))
-            self.simulation.world = block(engine.World(**given.members | {"switches": switches}))
+            turned = engine.Switches(**given.switches.members | dict.fromkeys(switches, on))
+            self.simulation.world = block(engine.World(**given.members | {"switches": turned}))
 
     def same_motion(self, other: Loop) -> bool:
         """Whether positions and velocities of tool and device are equal to the last bit in all steps."""

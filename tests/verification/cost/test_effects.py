@@ -12,7 +12,7 @@ from iapb.scene import Scene, SpatialScene, scene_names
 from reference.worlds import find_world
 from tests.iapb.contact.paper import scene_of
 from verification.clock import Times
-from verification.cost.effects import NOTHING, SWITCHED, Loop, Variant, effects_of, saved
+from verification.cost.effects import NOTHING, SWITCHED, Loop, effects_of, saved
 
 
 def _scene(name: str, duration: float) -> Scene:
@@ -48,7 +48,7 @@ def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
     M is a constant of some scenes in space to rounding alone: turned to each pose it has other last bits.
     """
     scene, world = _scene(name, 0.3), find_world("IAPB")
-    whole = Loop(scene, world, Variant())
+    whole = Loop(scene, world)
     whole.sample()
     spatial = isinstance(scene, SpatialScene)
     idle = [switch for switch in SWITCHED if not getattr(whole.simulation.world.switches, switch)
@@ -56,7 +56,7 @@ def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
     assert {"joint_damping", "gravity", "clustering"} & {*idle}
     alone = idle if name in ("peg_corner", "arm_obstacles", "peg_hole_space") else ()
     for switches in (*((switch,) for switch in alone), tuple(idle)):
-        other = Loop(scene, world, Variant(switches=switches, on=True))
+        other = Loop(scene, world, switches=switches, on=True)
         other.sample()
         assert all(getattr(other.simulation.world.switches, switch) for switch in switches)
         assert whole.same_motion(other), switches
