@@ -333,11 +333,8 @@ def of_each(
 ) -> Iterator[Result]:
     """Yield the results of each case; a case that raises an exception yields none and is recorded as a Failure."""
     for case in cases:
-
-        def listed(case: Case = case) -> list[Result]:
-            return list(results(case))
-
-        yield from attempt(name(case) if name else _words(case), listed, failures) or ()
+        said = name(case) if name else _words(case)
+        yield from attempt(said, lambda case=case: list(results(case)), failures) or ()  # type: ignore[misc]
 
 
 def counted(cases: Collection[Case], progress: Callable[[int, int], None]) -> Iterator[Case]:

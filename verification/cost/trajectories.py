@@ -201,7 +201,8 @@ def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
             late = bool(motions.where(scene=scene, method=method, outcome=TIMED_OUT).rows)
             found.append(Curve(
                 scene, method, tuple(run for run in here if run["method"] == method), tuple(used), tenfold_cost(used),
-                tuple(run for run in runs if run["position"] <= USEFUL and on_front(run, honest)),
+                tuple(run for run in runs if run["position"] <= USEFUL and not any(
+                    one["time"] < run["time"] and one["position"] < run["position"] for one in honest)),
                 float(min(run["position"] for run in runs)),
                 not used and late and len(kept) == len(runs), late and kept[-1] is runs[-1]))
     return found
@@ -258,11 +259,6 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
             "cut short [scenes]": sum(curve.cut_short for curve in mine),
             "failed [runs]": sum(run["outcome"] != OK for run in motions.where(method=method).records())})
     return WORTH.table_of(rows)
-
-
-def on_front(row: Record, others: Sequence[Record]) -> bool:
-    """Whether no other run of the scene is both faster and more accurate."""
-    return not any(one["time"] < row["time"] and one["position"] < row["position"] for one in others)
 
 
 IMPULSES, PENALTIES = "IAPB, semi-implicit Euler", "PB, semi-implicit Euler"

@@ -13,7 +13,7 @@ machine precision.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
 from math import sqrt
@@ -152,11 +152,6 @@ def exact(body: TorqueFreeBody, time: float) -> Tumble:
     return Tumble(axes, body.rates(time), drift * time, axes.T @ drift)
 
 
-def mechanism_of(body: TorqueFreeBody) -> Mechanism:
-    """Return the mechanism of the body with a free-flyer joint."""
-    return Mechanism([Body("body", None, Joint("free_flyer"), mass=MASS, inertia=np.diag(body.moments))])
-
-
 def path_compiled(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumble:
     """Return the states over DURATION, computed by the simulation."""
     start = [float(x) for x in (*DRIFT, *body.rates(0.0))]
@@ -164,13 +159,9 @@ def path_compiled(body: TorqueFreeBody, method: Integrator, steps: int) -> Tumbl
               "bodies.tennis_racket.inertia": list(body.moments), "bodies.tennis_racket.velocity": start}  # fmt: skip
     scene = load_scene(find_scene("tumbling_body")).with_values(values)
     run = simulate(scene, Penalty(integrator=method.name), steps=steps)
-    return _tumble(mechanism_of(body), zip(run.q, run.v, strict=True))
-
-
-def _tumble(mechanism: Mechanism, path: Iterable[tuple[Floats, Floats]]) -> Tumble:
-    states = [(*mechanism.placements(q), v) for q, v in path]
-    axes, place, v = (np.array(part) for part in zip(*states, strict=True))
-    return Tumble(axes[:, 0], v[:, 3:], place[:, 0], v[:, :3])
+    mechanism = Mechanism([Body("body", None, Joint("free_flyer"), mass=MASS, inertia=np.diag(body.moments))])
+    axes, place = (np.array(part) for part in zip(*map(mechanism.placements, run.q), strict=True))
+    return Tumble(axes[:, 0], run.v[:, 3:], place[:, 0], run.v[:, :3])
 
 
 def _halved(

@@ -167,10 +167,6 @@ def over_time(run: Run) -> Iterator[Row]:
                **{f"{name} [J]": float(values[place]) for name, values in series.items()}, "impacts": int(impacts)}
 
 
-def _open(study: Study, name: str) -> Row:
-    return open_row(study.scene(name), lambda scene: study.run(scene, WORLD, keep=False), REFINEMENTS[study.depth])
-
-
 CONTACTS = Check(
     key="contact", question="How deep do the bodies overlap, what do the impacts add, and how do the runs end?",
     cases=lambda study: scene_names(), row=lambda study, name: contact_row(_run(study, name)), says=_of_contacts,
@@ -178,7 +174,9 @@ CONTACTS = Check(
 )
 RESIDUALS = Check(
     key="what the books leave open", question="Does the residual fall with the integrator's order?",
-    cases=lambda study: scene_names(), row=_open, says=_of_residuals, digits=3,
+    cases=lambda study: scene_names(), says=_of_residuals, digits=3,
+    row=lambda study, name: open_row(study.scene(name), lambda scene: study.run(scene, WORLD, keep=False),
+                                     REFINEMENTS[study.depth]),
     note="Residuals of the energy balance; the absolute values of motion and springs are added. A scene without an "
     "order: its residual is rounding, and no shorter step was tried. The step for a residual of "
     f"{WORTH_NAMING:g} % is the longest tried step that reaches it, or is extrapolated with the measured order.",
