@@ -13,7 +13,6 @@ import numpy as np
 from iapb import certify
 from iapb.contact.laws import ENGINE_LAWS
 from reports.batches import cores, processes
-from reports.store.io import opened
 from reports.store.runs import read_run
 from verification.check import Check, Study, Topic
 from verification.finding import NOT_TESTABLE, Part, attempt, verdict_of_law
@@ -24,6 +23,7 @@ from verification.table import HOLDS, Row, Table
 _DRAWN = {"quick": 20_000, "full": 1_000_000}  # impacts of each family
 _SLOW = ("subnormal velocities",)  # takes 2 ms an impact, the others some µs: a quarter of the impacts
 CERTIFIED_RUNS = "certified runs"  # the check that needs the runs of all other stages
+WITHOUT_IMPACTS = ("PB", "CBuc", "ideal", "ideal-friction")  # their runs, named in their files, are not even read
 FEW = 100  # runs that are certified in this process, which is faster than to start others
 _RUNS = ("Impulse: the recorded generalized impulse; p: the recorded impulses at the contacts. Each of the last three "
          "numbers is the largest relative error of an equation: M (v⁺ − v⁻) = impulse, Jᵀp = impulse, Jv⁺ = −e Jv⁻.")
@@ -45,11 +45,10 @@ def _rows(folder: Path, name: str) -> list[Row]:
 
     Rigid worlds are left out: they solve for the impulses and forces of a step together and record no separate impact.
     """
-    with opened(folder / name) as file:  # to read all of a run takes ten times as long
-        if file["law/name"].asstr()[()] not in ENGINE_LAWS:
-            return []
+    if any(f"-{world}-" in name for world in WITHOUT_IMPACTS):
+        return []
     run = read_run(folder / name)
-    if not len(run.impacts.step):
+    if run.law not in ENGINE_LAWS or not len(run.impacts.step):
         return []
     one = certify(run)
     return [{"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains,

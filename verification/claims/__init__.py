@@ -18,7 +18,14 @@ from reference.worlds import run_world
 from verification.check import Check, Study
 from verification.finding import Failure, Finding, attempt, with_failures
 
-_FILES = ("algebraic", "arm", "peg", "walls", "socket", "speed")
+_FILES = (
+    "algebraic",
+    "arm",
+    "peg",
+    "walls",
+    "socket",
+    "speed",
+)
 CLAIMS: dict[str, Check] = dict(sorted(
     (name, claim) for file in _FILES for name, claim in vars(import_module(f"{__name__}.{file}")).items()
     if isinstance(claim, Check) and name == claim.key
