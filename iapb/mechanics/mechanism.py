@@ -155,7 +155,10 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        return self.mass_matrices(self._place(q)[None])[0]
+        place, out = float_array("q", q, (self.nq,)), np.empty((1, self.nv, self.nv))
+        if not self._entries.mass_matrices_at(self._parts, self._scratch.parts, place[None], out):
+            self._place(place)
+        return out[0]
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
@@ -167,7 +170,12 @@ class Mechanism:
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
-        return self.biases(self._place(q)[None], self._rates(v)[None])[0]
+        place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
+        out = np.empty((1, self.nv))
+        if not self._entries.biases_at(self._parts, self._scratch.parts, place[None], rates[None], out):
+            self._place(place)
+            self._rates(rates)
+        return out[0]
 
     def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""

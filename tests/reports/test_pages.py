@@ -36,7 +36,7 @@ from verification.claims import CLAIMS
 from verification.claims.conditions import FULL_GRID
 from verification.claims.peg import ALL_THREE, LARGE
 from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding, Part, finding_of
-from verification.hard_cases.findings import STABLE, finding_on
+from verification.hard_cases.findings import STABLE, finding_on, on_hard_cases
 from verification.laws.topic import counterexample, properties
 from verification.region import Region
 from verification.table import table_from, titled
@@ -166,6 +166,11 @@ def test_hard_cases_are_seen_at_a_glance_the_engines_failures_first_and_a_refusa
     for text in ('<span class="good">✓</span>&nbsp;factored: stable', '<span class="bad">✕</span>&nbsp;gram: refused',
                  "1 of 2 stable", "Skipped: needs bowl.lcp."):
         assert text in page, text
+    stiff = replace(hard_case(("IAPB", "gains energy", 0.5)), title="stiff wall")
+    found = on_hard_cases((hard_case(("IAPB", "stable", 0.0)), stiff))
+    assert found.verdict == MIXED and "1 of 2" in found.answer and "“stiff wall” (gains energy)" in found.answer
+    assert found.parts[0].miss == "1 of 2 hard cases fails: “stiff wall” (gains energy)"
+    assert "1 cases were skipped" in on_hard_cases((stiff, SKIPPED)).answer
     calm, others, ours = (finding_on(name, name, table_from([{"method": "factored", "outcome": own}, {
         "method": "svd", "outcome": other}]), {}) for name, own, other in (
             ("calm", STABLE, STABLE), ("others", STABLE, "refused"), ("ours", "wrong motion", STABLE)))  # fmt: skip
@@ -201,8 +206,10 @@ def test_pages_are_written_whole_with_their_archive_and_too_large_ones_are_refus
         target = write_report(tmp_path / "out", given)
         archives.append((target.parent / ARCHIVE_NAME).read_bytes())
     assert target.read_text() == "<html>" and (tmp_path / "out" / "report" / "idea.html").read_text() == "<p>"
+    assert sorted(path.name for path in target.parent.iterdir()) == ["report", "report.html", ARCHIVE_NAME]
     with ZipFile(target.parent / ARCHIVE_NAME) as file:
         assert {name: file.read(name).decode() for name in file.namelist()} == given
+        assert {info.date_time for info in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}  # or its bytes would not repeat
     assert archives[0] == archives[1]
     with pytest.raises(ArgumentError, match="first page.*1000000"):
         write_report(tmp_path / "new", {FIRST_PAGE: "x" * (LARGEST_FIRST + 1)})

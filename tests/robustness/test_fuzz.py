@@ -247,7 +247,7 @@ LONG = {"verify", "prove", "reproduce", "compare", "bench"}  # a line that might
 
 def run_line(path):
     """Run a line where the files are that it may name; it must end with 0, 1 or 2, and say why where it is not 0."""
-    words = path.read_text(errors="replace").split()
+    words = path.read_text(errors="replace").split(" ")  # words may be empty or have other blanks
     words = [word for word in words if word != "--debug"]  # which shows a traceback
     words += ["--no-such-option"] if set(words) & LONG else []
     for place in (path.parent, path.parent / "results"):

@@ -21,7 +21,7 @@ from verification.impacts import Floats
 
 Exact = NDArray[np.object_] | Floats
 
-NEWTON_COULOMB = "Newton's and Coulomb's laws"  # Newton's law with Coulomb friction, as in Kane and Levinson
+NEWTON_COULOMB = "Newton with Coulomb"  # Newton's law with Coulomb friction, as in Kane and Levinson
 COULOMB = "ideal with friction"  # the rigid world with Coulomb friction; the paper's rigid worlds have none
 RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
 NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps

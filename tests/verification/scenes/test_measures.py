@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iapb import find_scene, simulate
 from verification.claims.conditions import Condition
 from verification.scenes import measures
 
@@ -101,3 +102,12 @@ def test_a_start_has_the_clearance_and_the_travel_it_says(tilt):
     gaps = [gap[0] for gap in measures.corner_gaps(np.array([placed.bodies[0].position]))]
     assert min(gaps[0::2]) == pytest.approx(0.012)
     assert min(gaps[1::2]) == pytest.approx(0.007)
+
+
+def test_penetration_is_that_of_the_deepest_contact():
+    run = simulate(find_scene("peg_corner"))
+    depth, rows = measures.trace_of(run).penetration, run.contacts
+    assert depth.max() > 0.0
+    for k in range(run.steps):
+        gaps = rows.gap[rows.offsets[k] : rows.offsets[k + 1]]
+        assert depth[k] == (max(-gaps.min(), 0.0) if len(gaps) else 0.0)
