@@ -95,7 +95,7 @@ def _recorded_says(table: Table) -> Part:
 def _drawn_says(table: Table) -> Part:
     least = floor(1000.0 * min(table.column("moved"), default=0.0)) / 1000.0  # never rounded up
     moved = f"at least {least:.1%} of the impacts of each kind changed the velocity"
-    whole = f"{moved}, so that it could have gained energy"
+    whole = f"{moved}, and so could have gained energy"
     return Part(f"{_adverse(table)}; {moved}", "", quantities=(("adverse impacts certified", f"{_sums(table)[1]:,}"),),
                 target="none", asked="Random impacts, drawn to provoke a gain, that gain energy",
                 measured="{} of {:,}; {}".format(*_sums(table), whole))  # fmt: skip

@@ -114,15 +114,15 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
     starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper says: impulses bring the hand's path nearer to that at a rigid wall than springs alone do, or a "
-        f"coupling by a spring. Of {starts} starts this holds, where the paths clearly differ, in {each}.")
+        "The paper says: impulses bring the hand's path nearer to that at a rigid wall than springs alone, or a rigid "
+        f"wall felt through a spring. In {starts} starts, where the paths clearly differ, this holds in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = ", ".join(f"in {name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the peg, the paper's example, starts tilted by at most {degrees(Condition().tilt):.2f}° "
-            f"({Condition().tilt:g} rad), impulses bring the hand's path nearest to that at a rigid wall: {each} that "
-            f"can tell, of {of} starts.")
+            f"In {of} starts of the paper's peg with a tilt of at most {degrees(Condition().tilt):.2f}° "
+            f"({Condition().tilt:g} rad), where the paths clearly differ, impulses bring the hand's path nearest to "
+            f"that at a rigid wall {each}.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -143,7 +143,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lines = []
     for topic in sorted(topics, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
         if clauses := [part.miss for part in topic.parts if part.miss]:
-            more = f" (on its page {len(clauses) - 1} more)" if len(clauses) > 1 else ""  # the line links to the page
+            more = f" ({topic.title}: {len(clauses) - 1} more)" if len(clauses) > 1 else ""
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."

@@ -150,5 +150,5 @@ IMPACT_TIMES = Check(
     note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. The two kernels are called "
     "from compiled code, all others from Python. The common interface of the solvers checks arguments and results and "
     "forms W, which takes about 0.3 ms even for one contact; “direct call” is DAQP without this interface. "
-    "Distance of v⁺: from IAPB's for ours and the printed formula, from DAQP's for the others.",
+    "Distance of v⁺: from IAPB's for our two and the printed formula, from DAQP's for the complementarity solvers.",
 )  # fmt: skip

@@ -83,7 +83,7 @@ def light_direction() -> HardCase:
     return HardCase(
         "Velocity along M's lightest direction, κ(M) = 1e12",
         "backward error of Cholesky's factor: Higham, Accuracy and Stability (2002), chapter 10",
-        "Cholesky's backward error, at most d ε κ(M) = 1e-3, reaches the energy's fifth digit",
+        "Cholesky's backward error, with the bound d ε κ(M) = 1e-3, here changes the energy's fifth digit",
         "no gain with the clamp; for other methods up to 10 d ε √κ(M) is allowed",
         mass, rows, axes[:, -1], 1.0,
     )  # fmt: skip

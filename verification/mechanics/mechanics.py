@@ -24,9 +24,9 @@ def _answer(tables: Mapping[str, Table], _: Sequence[Part]) -> str:
     lost = min(balls.where(treatment=PER_BODY)["momentum change"])
     return (f"Mass matrices, forces and Jacobians differ from Pinocchio's by at most {worst:.1e} of the largest "
             "entry. With (13)-(14), an own impulse for each of two touching bodies, impacts of a ball on resting balls "
-            f"change the total momentum by at least {lost:.2g} times its value: the ball rebounds as from a wall. A "
-            "ball that rolls over flat facets gets no false collisions only if it never leaves the surface and the "
-            "coherence distance exceeds the way between the contacts on neighbouring facets.")
+            f"change the total momentum by at least {lost:.2g} times its value: the ball rebounds as from a wall. To "
+            "roll over flat facets without false collisions, a ball must stay on the surface, and the coherence "
+            "distance must exceed the way between the contacts on neighbouring facets.")
 
 
 mechanics = Topic(

@@ -154,7 +154,7 @@ def _of_residuals(table: Table) -> Iterator[Part]:
         f"larger in {len(wide)} of {len(rows)} scenes{said and ': ' + said}",
         f"at most {WORTH_NAMING:.0f} % of the energy exchanged", MIXED if wide else REPRODUCED,
         miss=f"in “{_title(wide[0]['scene'])}” the energy errors of the time steps add up to "
-             f"{wide[0][OPEN]:.1f} % of the energy exchanged, work included" if wide else "")
+             f"{wide[0][OPEN]:.1f} % of the energy exchanged" if wide else "")
 
 
 def over_time(run: Run) -> Iterator[Row]:

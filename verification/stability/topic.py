@@ -58,9 +58,9 @@ def _of_maps(table: Table) -> Iterator[Part]:
     yield Part.of(
         "Walls that Colgate's condition calls passive, but at which the mass moves ever more (penalties, ideal "
         "sensors, device with damping)",
-        f"{gains or 'none'} of {passive[damped].sum()}. {(~passive & (theirs == SETTLES))[damped].sum()} walls at "
-        "which the condition fails are stable, too: it is for the worst hand, ours is a constant force",
-        "none",
+        f"{gains or 'none'} of {passive[damped].sum()}. Of the walls at which the condition fails, "
+        f"{(~passive & (theirs == SETTLES))[damped].sum()} are stable, too: it is for the worst hand, ours is a "
+        "constant force", "none",
         REFUTED if gains else REPRODUCED)
     shares = " and ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
                           for one in dict.fromkeys(rate[bare].tolist()))
