@@ -75,11 +75,10 @@ class _Sheet:
     """What some axes show, as ink at each point of a drawing of 72 points per inch, from its lower left corner."""
 
     def __init__(self, axes: Any) -> None:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.text import Text
 
         self.axes = axes
-        FigureCanvasAgg(axes.figure).draw()  # positions are known after the layout
+        axes.figure.draw_without_rendering()  # positions are known after the layout
         self.frame = axes.get_window_extent().extents.reshape(2, 2)
         self.ink = self._inked([*axes.patches, *axes.collections, *axes.lines, *axes.texts])
         self.names = np.zeros_like(self.ink)

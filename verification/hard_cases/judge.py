@@ -198,6 +198,10 @@ class OutOfMemory(IapbError):
     verdict = "out of memory"
 
 
+def _out_of_memory(most_bytes: int) -> OutOfMemory:
+    return OutOfMemory(f"needs more than {most_bytes / 2**30:g} GiB")
+
+
 class Answer(NamedTuple):
     """The judged quantities of an impact, v⁺ and rank (None: not known), and the time of the call [s]."""
 
@@ -334,14 +338,17 @@ def bounded_impact(
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # each thread's buffers count as address space
     environment = {**os.environ, **paths, **threads}
     command = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment) as process:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, env=environment) as process:
         if process.stdout is None or process.stdout.readline() != _READY:
             raise IapbError("the process for a bounded call did not start")
         try:
-            out, _ = process.communicate(pickle.dumps((case, method, most_bytes)), timeout=limit)
+            out, told = process.communicate(pickle.dumps((case, method, most_bytes)), timeout=limit)
         except subprocess.TimeoutExpired:
             process.kill()
             raise TimedOut(f"cut after {limit:g} s") from None
+    if b"failed init" in told:  # numpy's SVD without memory raises nothing, and its result is what memory held
+        raise _out_of_memory(most_bytes)
     if process.returncode != 0:
         raise IapbError(f"the process for a bounded call ended with code {process.returncode}")
     found = pickle.loads(out)
@@ -365,7 +372,7 @@ def serve() -> None:
         try:
             found: Any = resolve_once(case, method)
         except MemoryError:
-            found = OutOfMemory(f"needs more than {most_bytes / 2**30:g} GiB")
+            found = _out_of_memory(most_bytes)
         except IapbError as error:
             found = error
     sys.stdout.buffer.write(pickle.dumps(found))
