@@ -36,7 +36,7 @@ def _kernels_say(table: Table) -> Part:
     tried = {name: len(table.where(problem=name).rows) for name in sizes}
     where = " and ".join(f"at {len(found)} of {tried[name]} sizes of a {name.split()[-1]} (contacts: "
                          f"{' to '.join(map(str, sorted({min(found), max(found)})))})" for name, found in sizes.items())
-    return faster("both methods compiled", "Lemke's method", "impacts", table.holds, where)
+    return faster("both methods compiled", "Lemke's method", "sizes of impact", table.holds, where)
 
 
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> Part:

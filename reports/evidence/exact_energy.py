@@ -54,7 +54,7 @@ def _rows(folder: Path, name: str) -> list[Row]:
     one = certify(run)
     return [{"run": name, "law": run.law, "impacts": one.impacts, "gains": one.gains,
              "largest gain": one.largest_gain, "M Δv − impulse": _known(one.momentum),
-             "Jᵀp − impulse": _known(one.span), "restitution": _known(one.restitution), HOLDS: one.passed}]
+             "Jᵀp − impulse": _known(one.span), "error of restitution": _known(one.restitution), HOLDS: one.passed}]
 
 
 def _certify_beside(study: Study, names: Sequence[str]) -> None:

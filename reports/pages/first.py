@@ -18,10 +18,11 @@ from verification.cost.steps import hardest
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
-    "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv; equations (18) and (24) lack the ½. The matrix in (37) is not the "
-    "pseudo-inverse of W = J M⁻¹Jᵀ, but (33) is true: redundant rows do not change v⁺. Equations (13) and "
-    "(14) give each of two touching bodies an impulse of its own, so that momentum is not conserved. The impulse (20), "
-    "which gives the velocity (21), can add energy by rounding if it is computed as printed."
+    "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv, where W† is the pseudo-inverse of W = J M⁻¹Jᵀ; (18) and (24) lack the ½. "
+    "The matrix in (37) is not W†, but what it should prove, (33), is true: redundant rows do not change v⁺. (13) and "
+    "(14) give each of two touching bodies an impulse of its own, so that momentum is not conserved. An impulse spread "
+    "over several steps loses the energy of (24) only for e = 0. The impulse (20) can pull, and computed as printed it "
+    "can add energy by rounding."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
@@ -62,8 +63,8 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     counts = [f"{count} {words}" for count, words in count_claims(evidence.claims).values()]
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
-    told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} tests decide these "
-                 f"verdicts; {unknown:,} more cannot, because the compared values differ by less than their error.",
+    told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials decide these "
+                 f"verdicts; {unknown:,} more cannot: the values are too close, or the effect does not occur.",
                  "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
@@ -98,11 +99,12 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
         found["on the paper's device, limited to 15 N"] = limits.where(force_limit=1.0)
     ratios = {device: [row["IAPB"] / row["PB"] for row in rows.records()
                        if row["coordinate"] != "rotation" and row["PB"]] for device, rows in found.items()}  # fmt: skip
-    said = [f"{median(each):.2g} times as large {device} (median of {len(each)} cases)"
+    said = [f"{median(each):.2g} times as large {device} (median of {len(each)} values)"
             for device, each in ratios.items() if each]  # fmt: skip
     if said:
         yield all(median(each) > 1.0 for each in ratios.values() if each), (
-            "As the paper claims, impulses push harder than springs alone: the largest force on the hand is "
+            "As the paper claims, impulses push harder than springs alone: the largest force on the hand, in x "
+            "and in y, is "
             f"{', and '.join(said)}.")
 
 
@@ -114,15 +116,16 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
     starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper says: impulses bring the hand's path nearer to that at a rigid wall than springs alone, or a rigid "
-        f"wall felt through a spring. In {starts} starts, where the paths clearly differ, this holds in {each}.")
+        "The paper says: with impulses, the hand's path is nearer to that at a rigid wall than with springs alone, and "
+        f"nearer than with a rigid wall felt through a spring. Of {starts} starts, those with clearly different paths "
+        f"decide. This holds in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = ", ".join(f"in {name} in {ahead} of {told}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"In {of} starts of the paper's peg with a tilt of at most {degrees(Condition().tilt):.2f}° "
-            f"({Condition().tilt:g} rad), where the paths clearly differ, impulses bring the hand's path nearest to "
-            f"that at a rigid wall {each}.")
+            f"If the paper's peg is tilted by at most {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} "
+            f"starts), the path with impulses is nearest to that at a rigid wall {each} starts with clearly different "
+            "paths.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -134,8 +137,8 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
         yield (f"In {len(ratios)} scenes at rest or nearly so, our step is {1.0 / ratios[-1]:.2g} to "
                f"{1.0 / ratios[0]:.2g} times as fast as MuJoCo's.")
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
-        yield (f"Lemke's complementarity method is faster than our engine in {raced.holds.count(False)} of the "
-               f"{len(raced.decided)} tested impacts whose times differ clearly.")
+        yield (f"Lemke's complementarity method is faster than our engine at {raced.holds.count(False)} of "
+               f"{len(raced.decided)} sizes of impact at which the times clearly differ.")
 
 
 def _misses(topics: tuple[Finding, ...]) -> Fact:
@@ -143,7 +146,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lines = []
     for topic in sorted(topics, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
         if clauses := [part.miss for part in topic.parts if part.miss]:
-            more = f" ({topic.title}: {len(clauses) - 1} more)" if len(clauses) > 1 else ""
+            more = f" (and {len(clauses) - 1} more, page {topic.title})" if len(clauses) > 1 else ""
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."

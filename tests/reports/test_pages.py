@@ -248,7 +248,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     for text in ("holds where tilt ≤ 0.015 rad", "over all conditions 30 of 40</span>", "fails, as printed",
                  "fails (beyond the paper)", "Fails in a quantity<", "1 of 40 (7 more cannot tell)"):
         assert text in first, text
-    assert "125 tests decide these verdicts; 7 more" in page
+    assert "125 trials decide these verdicts; 7 more" in page
     assert badge_words(topics[0]) == "1 of 2 findings fails" and badge_words(one("p", Part("a", REFUTED))) == "fails"
 
 
@@ -275,9 +275,9 @@ def test_the_answer_is_made_from_the_claims():
     x, turned = Part("s.", finding.WHERE, "x", 40, 40), Part("s.", REFUTED, "rotation", 1, 40, named="rotation")
     ours = Part("s.", REFUTED, "x, larger", 0, 9, role=finding.BEYOND)
     said = told(one("C10", x, turned, ours), forces, one("C14", tables={"C14": table}))
-    assert "8 times as large with a device of unlimited force (median of 3 cases), and 3 times" in said["Holds"]
-    assert "this holds in 40 of 40 in x, 1 of 40 in rotation." in said["Fails"] and "of 9" not in said["Fails"]
-    assert "this holds in 40 of 40 in x." in told(one("C10", x, ours))["Holds"]
+    assert "8 times as large with a device of unlimited force (median of 3 values), and 3 times" in said["Holds"]
+    assert "This holds in 40 of 40 in x, 1 of 40 in rotation." in said["Fails"] and "of 9" not in said["Fails"]
+    assert "This holds in 40 of 40 in x." in told(one("C10", x, ours))["Holds"]
 
 
 def test_the_first_page_maps_c10_and_small_tilts_hold_only_if_every_start_that_can_tell_does():
@@ -289,7 +289,7 @@ def test_the_first_page_maps_c10_and_small_tilts_hold_only_if_every_start_that_c
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
     for lost, label in ((0, "Holds"), (1, "Fails")):
         said = told(c10(("x", "y", ALL_THREE), lost))
-        assert "at most 0.86° (0.015 rad)" in said[label] and f"in x in {24 - lost} of 24" in said[label]
+        assert "at most 0.86° (0.015 rad; 24 starts)" in said[label] and f"in x in {24 - lost} of 24" in said[label]
 
 
 def test_the_first_screen_names_our_failures_the_gravest_first_and_what_was_not_computed():
@@ -303,7 +303,7 @@ def test_the_first_screen_names_our_failures_the_gravest_first_and_what_was_not_
     topics = (*(topic(key, MIXED, f"miss of {key}", "more") for key in given), topic("engines", MIXED))
     (fact,) = (fact for fact in facts(Evidence(topics=topics)) if fact.label == "Known failures")
     assert [id for _, id in fact.items] == [*given[:-3:-1], *given[3:0:-1], given[0]]  # engines: not our failure
-    assert fact.items[0] == ("Miss of exact-energy (exact-energy: 1 more)", "exact-energy")
+    assert fact.items[0] == ("Miss of exact-energy (and 1 more, page exact-energy)", "exact-energy")
 
 
 # Quantities that several pages quote

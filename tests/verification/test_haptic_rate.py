@@ -104,7 +104,7 @@ def _found(tables: Tables) -> Finding:
         ({SCALING.key: _times(5.0)}, "takes 5 times"),
         ({SOLVERS.key: _costs((IAPB, 1e-4), ("daqp", 3e-5), (DAQP, 2e-4))}, "on a patch of 4 contacts than daqp"),
         ({SOLVERS.key: _costs((IAPB, 1e-4), ("daqp", 3e-4), (DAQP, 3e-5))}, "faster than DAQP in 0 of the 1 impacts"),
-        ({KERNELS.key: _kernels(2.0, 0.5, 1.0)}, "faster than Lemke's method in 1 of the 2 impacts"),
+        ({KERNELS.key: _kernels(2.0, 0.5, 1.0)}, "faster than Lemke's method in 1 of the 2 sizes of impact"),
         ({BODIES.key: _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2"),
         ({BODIES.key: _bodies(20, 200, step=float, tested=lambda n: n * n)}, "tested pairs"),
         ({BUDGET_ROWS.key: BUDGET_ROWS.table_of([_budget(2, gain=1e-16)])}, "adds energy in 1 of 1"),

@@ -140,7 +140,7 @@ EXACTLY_PASSIVE = "kinetic energy does not rise, in rationals"
 WITH_HALF = "loss is ½(1 − e²) vᵀJᵀW†Jv"
 AS_PRINTED = "loss is (1 − e²) vᵀJᵀW†Jv"
 EXACT_LOSS = "loss is ½(1 − e²) vᵀJᵀW†Jv, in rationals"
-CAN_GAIN = "By design the engine never gains; in doubles the printed (21) can (page Passive in floating point)."
+CAN_GAIN = "By design the engine never gains; in doubles the printed (21) can (page Properties)."
 
 
 def losses(key: str, question: str, place: str, families: Sequence[Family], impacts: Mapping[str, int]) -> Check:

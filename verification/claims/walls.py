@@ -171,10 +171,11 @@ def _settling(study: Study, case: Case) -> Iterator[Row]:
 
 
 def _settles(row: Row) -> bool | None:
-    """Return whether impulses settle, or settle no later than the rival penalty; None if neither settles."""
+    """Return whether impulses settle where the rival does, or no later; None if the rival, or both, never settle."""
     ours, theirs = row["impulses settle after"], row["penalty settles after"]
-    held = np.isfinite(ours) if row["test"] == WHEREVER else ours <= theirs
-    return bool(held) if np.isfinite(min(ours, theirs)) else None
+    if row["test"] == WHEREVER:
+        return bool(np.isfinite(ours)) if np.isfinite(theirs) else None
+    return bool(ours <= theirs) if np.isfinite(min(ours, theirs)) else None
 
 
 def _settling_says(table: Table) -> str:
@@ -207,7 +208,8 @@ C21 = Check(
     "the damping (1 + e) m/T, whose force at first contact equals that of the impulse (in the paper: equivalent gain). "
     "Beyond the paper: which law settles sooner, and penalties or both laws at their best damping of at least 50 N s/m "
     "for each wall, chosen afterwards.",
-    tolerance="None: the mass settles within three seconds or not. A trial cannot tell if it settles with neither law.",
+    tolerance="None: the mass settles within three seconds or not. A trial cannot tell if it settles with neither "
+    "law; of “every wall”, if it does not settle without impulses.",
     roles={NO_LATER: BEYOND, BOTH: BEYOND, TUNED: BEYOND},
     cases=lambda study: [(loop, grid(study.depth)[0]) for loop in loops()], row=_settling, holds=_settles,
     says=_settling_says, draw=_draw, parts=["against", "test"],

@@ -78,14 +78,14 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
     only = (f"{lost} walls are stable only without impulses, {there or 'none'} of them at the paper's damping of "
             f"{PAPER_DAMPING:g} N s/m")  # fmt: skip
     return Part(
-        f"Of {theirs.size:,} walls (pairs of stiffness and damping), {ours.sum()} are stable with impulses and "
-        f"{theirs.sum()} without; the ratio is {min(more):.2f} to {max(more):.2f}, depending on sampling rate, sensor "
-        f"and damping of the device. {only}.",
+        f"Of {theirs.size:,} walls ({theirs.size // len(groups)} pairs of stiffness and damping in {len(groups)} "
+        f"loops: rate, sensor, device damping), {ours.sum()} are stable with impulses and {theirs.sum()} without; "
+        f"the ratio is {min(more):.2f} to {max(more):.2f}, depending on the loop. {only}.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Stable walls with impulses, and without", target="more with impulses, and none lost",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
-        miss=f"of {theirs.size:,} walls (pairs of stiffness and damping) {lost} are stable only without impulses "
-             f"({there or 'none'} at the paper's damping), {int((ours & ~theirs).sum())} only with them"
+        miss=f"of {theirs.size:,} walls {lost} are stable only without impulses ({there or 'none'} at the paper's "
+             f"damping), {int((ours & ~theirs).sum())} only with them"
         if lost else "")
 
 
