@@ -244,8 +244,10 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
 ERRORS = Check(
     key="errors", question="Does the engine give the known outcome?",
     cases=lambda study: product(SIMULATORS, FIXED_SCENES), row=_rows, says=_says, digits=2,
-    note="The errors of energy, momentum and velocity are relative to the kinetic energy at the start, the sum of m "
-    "|v| and the largest speed. In resting scenes the rise of energy is relative to m g times the bodies' size. "
+    note="The errors of energy, momentum and velocity are relative, in this order, to the kinetic energy at the start, "
+    "the sum of m |v| and the largest speed. In resting scenes the rise of energy is relative to m g times the "
+    f"bodies' size. They are simulated for {QUICK_REST:g} s, stacks for {QUICK_STACK:g} s, unless the report is made "
+    "with --full. "
     "The outcome is right (“met”) if all errors are at most 1 % or, at rest, if nothing moves by more than 1 mm.",
 )
 engines = Topic(
@@ -255,8 +257,9 @@ engines = Topic(
     "“Own”: settings and a step that suit the engine, chosen by one rule for all impacts. “Matched”: a step of 1 "
     "ms, with the settings of least error on a grid; for MuJoCo and Drake they are chosen for each scene "
     "(docs/engines.md) and can be more exact than “own”. Our engine and our ideal world run with their defaults, a "
-    "step of 1 ms, so that both runs are the same. MuJoCo and Drake have no coefficient of restitution; damped springs "
-    "replace it. Overlap is shown, but does not decide the outcome.",
+    "step of 1 ms; Pinocchio only computes the impacts, with our steps. So both of their "
+    "runs are the same. MuJoCo and Drake have no coefficient of restitution; damped springs replace it. "
+    "Overlap is shown, but does not decide the outcome.",
     checks=(ERRORS, Check(key="settings", question="With which settings did the engines run?",
                           cases=lambda study: SIMULATORS, row=_settings),
             Check(key="scenes", question="What must come out?", cases=lambda study: FIXED_SCENES,

@@ -148,7 +148,7 @@ def losses(key: str, question: str, place: str, families: Sequence[Family], impa
     return batches(
         key, question, place=place, families=families, restitutions=(0.0, 0.5, 0.9, 1.0), impacts=impacts,
         quantity="Largest relative energy gain; largest difference between the energy loss and its quadratic form "
-        "vᵀJᵀW†Jv, relative to the form. An impact with e = 0 takes half of the energy.",
+        "vᵀJᵀW†Jv, relative to the form. Velocities are drawn such that an impact with e = 0 takes half of the energy.",
         tolerance="Gain: 10 d ε √κ(M), the rounding of the returned velocities. Difference: 100 d ε κ(M), the rounding "
         "of one solve with M. A trial that holds cannot tell if the two forms differ by less than ten times this, as "
         "with e = 1, where both are zero. In rational arithmetic: zero.",

@@ -176,9 +176,9 @@ def _trajectory_says(table: Table) -> str:
     rests, moves = (papers.where(**{"ideal settles": wanted}) for wanted in (True, False))
     evenly = papers.only(tilt in EVEN_TILTS for tilt in papers["tilt"])
     return (
-        f"The paper shows one start, in a figure that our copy of it lacks. At ours, tilted by {start.tilt:g} rad, the "
-        f"distances of {', '.join(WORLDS)} to ideal are {found}. Of the starts that can tell, IAPB is closest in "
-        f"{counts(papers)} (in the kinetic metric). The counts depend on the tilt. Tilts up to {start.tilt:g} rad: "
+        f"The paper shows one start, in Fig. 7, which our copy of it lacks. At our start, tilted by {start.tilt:g} "
+        f"rad, the distances of {', '.join(WORLDS)} to ideal are {found}. Of the starts that can tell, IAPB is closest "
+        f"in {counts(papers)} (in the kinetic metric). The counts depend on the tilt. Tilts up to {start.tilt:g} rad: "
         f"{counts(small_tilts(papers))}. Evenly spaced tilts: {counts(evenly)}. In the ideal world the peg does not "
         f"settle within the run from {len(moves.where(part='x').rows)} of {len(papers.where(part='x').rows)} starts "
         f"(tilts from {min(moves['tilt'], default=np.nan):g} rad on). From the others: {counts(rests)}."
@@ -243,11 +243,13 @@ def _forces_say(table: Table) -> str:
                          for name, unit in zip(COORDINATES, ("N", "N", "N m"), strict=True))  # fmt: skip
 
     return (
-        f"Largest forces with IAPB: {each(LARGE, max)}. In contact, outside collisions, the force differs from the one "
-        f"that balances the hand (0.32 N, 0.4 N, 0 N m) on average by these medians: {each(BALANCE, np.median)}. The "
-        "paper says “closer to the ideal forces” and names no norm. Of the starts that can tell, IAPB is closest in "
+        f"Largest forces with IAPB: {each(LARGE, max)}. Mean difference, in contact but outside collisions, from the "
+        "force that balances the hand (0.32 N, 0.4 N, 0 N m), as the median of all starts: "
+        f"{each(BALANCE, np.median)}. The paper says “closer to the ideal forces” and names no norm. Of the starts "
+        "that can tell, IAPB is closest in "
         f"{counts(table.where(part=CLOSEST), 'coordinate', COORDINATES)}: in the mean of |F − F_ideal|, with forces "
-        f"averaged over {AVERAGED} steps. Without the average the time step of the ideal world decides.")
+        f"averaged over {AVERAGED} steps. Without this average, the time step of the ideal world would change "
+        "the verdict.")
 
 
 C11 = peg_claim(
@@ -324,9 +326,10 @@ C12 = peg_claim(
     "largest, that the settling time increases and that the transient response is poorest (tested as: the longest "
     "settling time). Beyond the paper: both quantities for spread impulses. No friction.",
     tolerance="Saturating: strictly the largest of the three; the settling time: strictly longer than with full "
-    "impulses. Spreading: strictly the smallest. A trial cannot tell if no impulse reaches the limit, or if the "
-    "difference to the next rendering is below 2.5e-5 m in x, 5e-5 m in y and in the overlap, 5e-3 rad in rotation "
-    "(as in C10), or has no sign in settling time that is the same for all thresholds of C15.",
+    "impulses. Spreading: strictly the smallest. A trial cannot tell if no impulse reaches the limit; if the "
+    "difference to the next of the three ways (saturated, scaled, spread) is below 2.5e-5 m in x, 5e-5 m in y and in "
+    "the overlap, 5e-3 rad in rotation (as in C10); or, in settling time, if its sign depends on the thresholds of "
+    "C15.",
     row=_lost, holds=_most_or_least, says=_lost_says, parts=("measure", "part"),
     named=NAMED | {OVERLAP: OVERLAP, SETTLING: SETTLING}, axes=("tilt", "clearance", "measure", "part"),
     roles={f"{OVERLAP}, {LEAST}": BEYOND, f"{SETTLING}, {LEAST}": BEYOND},
@@ -408,7 +411,7 @@ C14 = peg_claim(
     quantity="Peak force of the device's actuators in the run, per coordinate: IAPB with spread impulses, and PB, on "
     "a device with the same force limits.",
     tolerance="IAPB's peak is strictly larger. A trial cannot tell if both peaks are the limit of the device, or if "
-    "neither reaches a hundredth of the least force that can be felt.",
+    "neither reaches a hundredth of the least force that a fingertip feels (0.05 N).",
     row=_limited_forces, holds=_limited_forces_hold, says=_limited_forces_say, parts=("coordinate",),
     axes=("tilt", "force_limit", "coordinate"),
 )  # fmt: skip
@@ -447,8 +450,8 @@ def _settling_says(table: Table) -> str:
             f" and a median settling time of {np.median(times['IAPB']):.2f} s (PB {np.median(times['PB']):.2f} s)")
     smooth = table.where(part=SETTLES, friction=0.0).decided
     texts.append(f"without friction it settles sooner in {sum(smooth)} of {len(smooth)} runs")
-    return ("The paper reports an experiment. Here the device is the pure mass of Section VI, and a simulation neither "
-            f"confirms nor refutes an experiment. At the paper's approach velocity the peg has {'; '.join(texts)}. A "
+    return ("The paper reports an experiment, which is not tested. The verdict is on a simulation of the pure mass of "
+            f"Section VI. At the paper's approach velocity the peg has {'; '.join(texts)}. A "
             "run that never settles counts as settling at its end.")
 
 

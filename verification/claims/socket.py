@@ -89,14 +89,14 @@ def _says(table: Table) -> str:
         "The paper's condition, a coherence distance above speed × step, is not sufficient. The contact on the next "
         f"facet is {1e3 * edge_jump(max(FACETS)):.2g} to {1e3 * edge_jump(min(FACETS)):.2g} mm away, and the distance "
         f"must reach it as well: with both filters no false collision remains in {sum(reaching.decided)} of "
-        f"{len(reaching.decided)} trials in which the distance is at least this jump + speed × step, and in "
-        f"{sum(short.decided)} of {len(short.decided)} trials with a shorter distance. The finer the facets, the "
-        f"nearer this is to the paper's condition. {sum(reaching.column('collisions on return'))} of the "
-        f"{sum(reaching.column('false collisions'))} that remain are those of a ball that bounced off the facets and "
-        "returns, which it does with little damping. With clustering alone "
-        f"the remaining contact jumps from facet to facet and is new each time: the median is {collisions} false "
-        f"collisions, against {unfiltered} without any filter. Clustering removes duplicate contacts: the median is "
-        f"{doubled}, against {all_contacts} without it."
+        f"{len(reaching.decided)} trials in which the coherence distance is at least this jump + speed × step, and in "
+        f"{sum(short.decided)} of {len(short.decided)} trials with a shorter one. The finer the facets, the nearer "
+        "this is to the paper's condition. In the other trials of the first kind, "
+        f"{sum(reaching.column('false collisions'))} false collisions remain, "
+        f"{sum(reaching.column('collisions on return'))} of them when a ball that bounced off the facets returns; "
+        "it bounces if the damping is small. Clustering alone removes duplicate contacts (median "
+        f"{doubled}, against {all_contacts} without it), but the contact that is left jumps from facet to facet and is "
+        f"new each time: the median is {collisions} false collisions, against {unfiltered} without any filter."
     )  # fmt: skip
 
 

@@ -106,8 +106,9 @@ def _leak_says(table: Table) -> str:
     undamped = table.where(**{"device damping": 0.0})
     most, fed = max(undamped.column("energy from the wall")), sum(map(_leaks, undamped.records()))
     worst = max(row["energy from the wall"] / row["wall's turnover"] for row in table.records() if _within(row))
-    return ("One motion of the hand is tried at each wall, the one that draws most. If the device damping b is at "
-            f"least KT/2 + B, it draws at most {worst:.1g} of the energy exchanged. Otherwise it draws energy as long "
+    return ("At each wall one motion of the hand is tried: the one that draws the most energy from it. If the device "
+            f"damping b is at least KT/2 + B, it draws at most {worst:.1g} of the wall's turnover. Otherwise it "
+            "draws energy as long "
             f"as it lasts. With a device without damping, as in the paper, it draws energy from {fed} of "
             f"{len(undamped.rows)} walls (up to {most:.2g} J in {_STEPS} samples).")
 
@@ -117,7 +118,7 @@ C20 = Check(
     place="Section VII, after Colgate and Schenkel",
     quantity="Energy that the hand draws from the engine's penalty force (5), sampled with period T and held, by the "
     "motion that draws most: to and fro at half the sampling rate, entirely inside the wall.",
-    tolerance="1e-11 of the energy exchanged (the wall's turnover): the rounding of the sums.",
+    tolerance="1e-11 of the wall's turnover (b + KT/2 + B) Σ Δx²/T: the rounding of the sums.",
     cases=lambda study: [
         (rate, stiffness, device, share) for rate in (512.0, 1000.0) for stiffness in WALL_STIFFNESSES
         for device in DEVICE_DAMPINGS for share in (OF_BOUND if device > 1.0 else (0.0, 1.0))
@@ -192,8 +193,9 @@ def _settling_says(table: Table) -> str:
         f"At the paper's damping of 50 N s/m, {never[SAME_DAMPING]}. At some other dampings, the same for both, walls "
         "settle only with penalties; the page Stability of contact counts them. If the penalties have the damping that "
         f"gives the force of the impulse, {never[EQUAL_GAIN]}. The paper prints that such a damping, sustained, “would "
-        "cause the system to be stable”. Its argument needs “unstable”, and this is tested: impulses "
-        f"must settle wherever this damping does. With it {settle[EQUAL_GAIN]} walls settle. Beyond the paper: if the "
+        "cause the system to be stable”. Its argument needs “unstable”. We test: wherever "
+        f"penalties with this damping settle, impulses settle, too. With this damping {settle[EQUAL_GAIN]} walls "
+        "settle. Beyond the paper: if the "
         f"penalties have the best damping for each wall, {never[TUNED]}. With the best damping of each law for each "
         f"wall, {never[BOTH]}, and impulses settle no later at {sum(sooner)} of "
         f"{len(sooner)} walls. The paper says that there are no guidelines for the choice of a large damping."

@@ -117,9 +117,9 @@ def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | 
 
 
 FRICTION = Check(
-    key="friction", question="In impacts with dry friction, IAPB never adds energy. Where every contact pushes, its "
-    "velocity equals that of Coulomb's law (a nonlinear complementarity problem, NCP). With e > 0 the NCP and its "
-    "convex relaxation (CCP) may add energy.",
+    key="friction", question="In impacts with dry friction, the world IAPB-friction never adds energy. Where every "
+    "contact pushes, its velocity equals that of Coulomb's law (a nonlinear complementarity problem, NCP). With e > 0 "
+    "the NCP and its convex relaxation (CCP) may add energy.",
     cases=lambda study: product(RESTITUTIONS, FRICTIONS), row=with_friction, rule=verdict_of_trials, digits=2,
     holds=lambda row: bool(row["share equal to the NCP"] == row["all contacts push"]
                            and row["largest change of KE, IAPB"] <= GAIN),
@@ -167,5 +167,5 @@ def struck_bar(study: Study, law: str) -> Row:
 BAR = Check(
     key="struck bar", question="", digits=5, row=struck_bar,
     cases=lambda study: ("before", "newton_equality", "newton_lcp", "poisson", LAW_OF_UNEQUAL),
-    note="A bar struck at 0.5 and 0.4 of its length with e = 1 and e = 0.",
+    note="A bar struck at 0.5 and 0.4 of its length from its centre, with e = 1 and e = 0.",
 )  # fmt: skip

@@ -143,7 +143,7 @@ def _says(table: Table) -> Part:
     return Part.of(
         "In dense piles with every colliding contact as an equality (21), can impulses that push produce the velocity?",
         f"in {agree:.0f} of {piles} impacts. The largest of these has {limit} contacts, which is no safe limit, "
-        f"because many smaller impacts fail. In impacts with more than {limit} contacts, {pulling:.0f} % of the "
+        f"because in many smaller ones they cannot. In impacts with more than {limit} contacts, {pulling:.0f} % of the "
         "impulses pull. If impulses may only push (method \"poisson\", world IAPB-push), the velocity equals that of "
         f"the LCP to {max(table['pushing from the LCP']):.0e}", "in all impacts",
         verdict_of_share(agree / piles), "piles",

@@ -29,8 +29,8 @@ _NOTES = {
               "KE⁻)/KE⁻, exactly. Error: |v⁺ − truth| / |v⁻| in the kinetic metric; allowed is what rounding may cause "
               "with a backward stable method, 10 n ε √κ_M (√κ_M + κ_A): n is the larger of c rows and d coordinates, "
               "κ_M the condition number of M scaled to a unit diagonal, κ_A that of A = J L⁻ᵀ with M = L Lᵀ. Smallest "
-              "error detected: the smallest relative error which, put into a stable impulse or velocity, changes the "
-              "verdict. Time: median of a call.",
+              "error detected: the smallest relative error that, added to a correct impulse or velocity, makes the "
+              "verdict fail. Time: median of a call.",
     "motion": "Stable: gain and error at most those allowed (what rounding or the time step may cause), restitution "
               "residual at most 1e-8. Gain: the largest amount of energy created, relative to the kinetic energy at "
               "the start plus the work of hand and gravity. Error: distance from the exact law, relative to its "
