@@ -11,7 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check --no-input
 # uv installs in a third of pip's time; where it cannot, say without an index that it knows, pip does.
-UV := UV_HTTP_TIMEOUT=30 UV_DEFAULT_INDEX="$${PIP_INDEX_URL:-$$($(PIP) config get global.index-url 2>/dev/null)}" \
+UV := UV_HTTP_TIMEOUT=30 UV_DEFAULT_INDEX="$${PIP_INDEX_URL:-$$($(BIN)/python -m pip config get global.index-url 2>/dev/null)}" \
 	$(BIN)/uv pip install --python $(BIN)/python
 # The stamps carry what they were made from, so that another lock makes another environment.
 LOCK_STAMP := $(VENV)/.lock-$(shell cksum < requirements.lock | cut -d ' ' -f 1)
