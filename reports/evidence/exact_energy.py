@@ -32,8 +32,8 @@ _NOTE = ("The impacts have up to 8 coordinates and contacts. A family is one kin
          "directions”: velocities along the lightest directions of M; “600 decades”: masses and speeds of nearly all "
          "sizes that doubles can represent. Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: v⁺ = "
          "v⁻, because no velocity that the clamp (the last step, which corrects rounding) tried was free of gain. "
-         "Energy cost: the extra loss at e = 1 by the clamp, in units of 10 d ε √κ(M), the bound "
-         "of what rounding can change (d coordinates).")
+         "Energy cost: the extra loss at e = 1 by the clamp, in units of 10 d ε √κ(M), the "
+         "most that rounding an exact v⁺ to doubles can change (d coordinates).")
 
 
 def _certified(study: Study, name: str) -> list[Row]:

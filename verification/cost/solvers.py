@@ -2,8 +2,8 @@
 
 It is the whole time from M, J, v to v⁺: it includes forming W or its factor for the references, and the checks of
 `resolve_impact` for IAPB. The kernels of IAPB and of Lemke's method are called from compiled code, as in the engine's
-step. Only methods that are called in the same way are compared. The common interface of the references takes a third of
-a millisecond for its checks; DAQP is timed without it, too.
+step. Only methods that are called in the same way are compared. The common interface of the references takes time for
+its checks; DAQP is timed without it, too.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def solvers_say(table: Table) -> tuple[Part, Part]:
         where = "; ".join(size + f" than {', '.join(names)}" * (len(solvers) > 1) for size, names in groups.items())
         return faster(how, rival, what, [more for _, more in pairs], where)
 
-    common = part("both methods called from Python (the solvers through a common interface, which takes about 0.3 ms)",
+    common = part("both methods called from Python (the solvers through a common interface)",
                   "the complementarity solver", "pairs of solver and size", SOLVERS)  # fmt: skip
     said = printed_faster(table)
     return (replace(common, measured=f"{common.measured}. {said}") if said else common,
@@ -149,6 +149,6 @@ IMPACT_TIMES = Check(
     cases=lambda _: [Size(family, contacts) for contacts in CONTACTS for family in FAMILIES],
     note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. The two kernels are called "
     "from compiled code, all others from Python. The common interface of the solvers checks arguments and results and "
-    "forms W, which takes about 0.3 ms even for one contact; “direct call” is DAQP without this interface. "
+    "forms W: compare “direct call”, DAQP without this interface. "
     "Distance of v⁺: from IAPB's for our two and the printed formula, from DAQP's for the complementarity solvers.",
 )  # fmt: skip

@@ -127,7 +127,7 @@ def _of_books(table: Table) -> Part:
     return Part.of(
         "The stored energy never exceeds the energy at the start plus the work done on the scene",
         f"holds in {len(rows) - len(made)} of {len(rows)} scenes"
-        + (f". Elsewhere time stepping, not an impact, creates energy at some instant: {words} of the energy exchanged"
+        + (f". Elsewhere time stepping, not an impact, creates more than rounding: {words} of the energy exchanged"
            if made else ""), "all scenes", MIXED if made else REPRODUCED,
         miss=f"in {len(made)} of {len(rows)} scenes the stored energy at some instant exceeds that at the start plus "
              f"the work done, by an error of time stepping ({words} of the energy exchanged)" if made else "")

@@ -207,7 +207,7 @@ def coordinated(ports: Table) -> Part:
         "Colgate's bound for the wall alone", f"up to {max(found['needed / bound']):.3g}: the device needs "
         f"{min(needed):.3g} to {max(needed):.3g} N s/m, because the hand also feels the coupling's "
         f"{COORDINATION[1]:g} N s/m. As a multiple of the bound for wall and coupling together: up to "
-        f"{max(map(truediv, needed, sums)):.3g}", "at most 1, which is proved only if the tool rests",
+        f"{max(map(truediv, needed, sums)):.3g}", "at most 1, which is proved for CBuc only",
         MIXED)
 
 
