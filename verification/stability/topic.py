@@ -140,8 +140,8 @@ contact_stability = Topic(
     question="A virtual wall in a sampled loop can feed energy to the hand. First, a constant force pushes a mass of 2 "
     "kg against many walls; a wall is a pair of stiffness K and damping B in one loop. The loop samples at 512 Hz or 1 "
     "kHz, and the motion between samples is exact. “Late” sensors: readings, rounded to 1 µm, and forces each come one "
-    "step late. A wall is stable if the mass comes to rest: in the last quarter of three seconds it is slower than 1 mm/s "
-    "and never leaves the wall. Then the paper's peg moves into its corner in the engine's own loop. Colgate's "
+    "step late. A wall is stable if the mass comes to rest: in the last quarter of three seconds it is slower than 1 "
+    "mm/s and never leaves the wall. Then the paper's peg moves into its corner in the engine's own loop. Colgate's "
     "condition, b >= KT/2 + |B| with the device's damping b and the period T, makes a wall passive for every hand, if "
     "sensors are ideal and the wall is a spring and damper.",
     checks=(MAPS, DAMPINGS, HARDNESS, PEG, PORT),
