@@ -198,7 +198,10 @@ class Check:
         if self.says is None:
             if self.holds is None and not table.holds:
                 return ()
-            held = f"{sum(table.decided)} of {len(table.decided)} rows of the table hold.{_spans(table, self.spans)}"
+            told = table.only(held is not None for held in table.holds)
+            more = len(table.rows) - len(told.rows)
+            held = (f"{sum(told.decided)} of {len(told.rows)} rows of the table hold"
+                    f"{f'; {more} more cannot tell' * bool(more)}.{_spans(told, self.spans)}")
             said: Said = Part(f"{self.question} {held}", "", timed=any(column.timed for column in table.columns),
                               asked=self.question, measured=held, target="every row")  # fmt: skip
         else:
