@@ -18,10 +18,11 @@ from verification.cost.steps import hardest
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
-    "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv, where W† is the pseudo-inverse of W = J M⁻¹Jᵀ; (18) and (24) lack the ½. "
-    "The matrix in (37) is not W†, but what it should prove, (33), is true: redundant rows do not change v⁺. (13) and "
-    "(14) give each of two touching bodies an impulse of its own, so that momentum is not conserved. The impulse (20) can pull, "
-    "and computed as printed it can add energy by rounding. Two more are in docs/theory.md."
+    "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv, where W† is the pseudo-inverse of W = J M⁻¹Jᵀ; (18) and (24) lack "
+    "the ½. The matrix in (37) is not W†, but what it should prove, (33), is true: redundant rows do not change "
+    "v⁺. (13) and (14) give each of two touching bodies an impulse of its own, so that momentum is not conserved. "
+    "The impulse (20) can pull, and computed as printed it can add energy by rounding. Two more are in "
+    "docs/theory.md."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
@@ -115,8 +116,8 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
     starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper says that impulses bring the hand's path nearer to that at a rigid wall than the other methods. Of "
-        f"{starts} starts, those with clearly different paths decide. This holds in {each}.")
+        "The paper says that impulses bring the hand's path nearer to that at a rigid wall than the other methods. "
+        f"Of {starts} starts, those with clearly different paths decide. This holds in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = ", ".join(f"in {name} in {ahead} of {told}" for name, (ahead, told) in found.items())

@@ -36,7 +36,7 @@ DESK, PHONE = (1400, 900), (400, 860)
 FIGURES = ("hero", "fig07", "fig08", "film-corner", "film-hole", "fig03")
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
 REAL = Path(__file__).parents[2] / "out" / "report.html"
-MOST_PRINTED = 7  # pages of paper for the first page: six, or one more with the widest fonts
+MOST_PRINTED = 7  # pages of paper for the first page: six, or one more with wide fonts
 ANSWERED = ("Tested", "✓ Holds", "✕ Fails", "✓ Energy", "Known failures", "Next step")  # one screen, two of a phone
 BELOW = """([texts, depth]) => texts.filter((text) => {
     const found = [...document.querySelectorAll(".first dt")]
