@@ -21,7 +21,7 @@ ERRATA = (
     "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv, where W† is the pseudo-inverse of W = J M⁻¹Jᵀ; (18) and (24) lack "
     "the ½. The matrix in (37) is not W†, but what it should prove, (33), is true: redundant rows do not change "
     "v⁺. (13) and (14) give each of two touching bodies an impulse of its own, so that momentum is not conserved. "
-    "The impulse (20) can pull, and computed as printed it can add energy by rounding. Two more are in "
+    "The impulse (20) can pull, and computed as printed it can add energy by rounding. One more is in "
     "docs/theory.md."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
