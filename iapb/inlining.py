@@ -19,20 +19,11 @@ from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.targetconfig import TargetConfig
 from numba.core.typed_passes import NativeLowering, NopythonTypeInference
 
 # Cost up to which LLVM inlines a call; with its default of 225 the effects of a step are not inlined. Measured on
 # resting steps: 500 and 1,000 are equally fast; from 5,000 on, a step of the peg takes a tenth longer.
 _INLINE_UP_TO = 500
-
-
-# Numba looks functions up by its options, and compares all 30 of them with those of each entry, which takes a tenth of
-# the time of compiling. Options that were set alike are equal; its own hash of them is a constant, too.
-_equal = TargetConfig.__eq__
-TargetConfig.__hash__ = lambda self: hash(type(self))
-TargetConfig.__eq__ = lambda self, other: (
-    type(self) is type(other) and (self._values == other._values or _equal(self, other)))
 
 
 class WholeLibrary(JITCodeLibrary):
