@@ -161,7 +161,7 @@ class Recorder:
             room = int(_ROOM / max(1, self._line_bytes))
             record = make_record(max(size, min(total - self.steps, room)), *self._shape)
         if self.steps == 0:
-            self.simulation.prepare(record)  # so that only steps are timed
+            self.simulation.prepare()  # so that only steps are timed
         started = time.perf_counter()
         done, stop = self.simulation.advance_chunk(record, size)
         self.keep(record, done, time.perf_counter() - started)

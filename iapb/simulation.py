@@ -15,7 +15,7 @@ import math
 import os
 from collections.abc import Callable
 from contextlib import suppress
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -44,21 +44,26 @@ FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range
                                              "for this coupling and delay"}
 
 
+PULL, MOVE, WRITE, WHOLE = 1, 2, 4, 7  # parts of a step; a single one costs no second compilation of the engine
+
+
 @kernel
-def compiled_steps(world, state, port, record, first, steps):  # type: ignore[no-untyped-def]
-    """Do `steps` steps of an engine law; return the number of steps done and the status."""
+def compiled_steps(world, state, port, record, part, first, steps):  # type: ignore[no-untyped-def]
+    """Do `steps` steps of an engine law, or one part of a step; return the number of steps done and the status."""
     line = record.used[0]
     for k in range(steps):
-        if port.planned.shape[0] > 0:
-            copy_into(port.wrench, port.planned[k])
-        couple(world, state, port)
-        status = advance(world, state, port.applied)
-        if status:
-            return k, status
-        render(world, state, port)
-        if port.coupling != NO_COUPLING and not move_device(world, state, port):
+        if part & PULL:
+            if part == WHOLE and port.planned.shape[0] > 0:
+                copy_into(port.wrench, port.planned[k])
+            couple(world, state, port)
+            status = advance(world, state, port.applied)
+            if status:
+                return k, status
+            render(world, state, port)
+        if part & MOVE and port.coupling != NO_COUPLING and not move_device(world, state, port):
             return k, DEVICE_NOT_FINITE
-        write_step(record, line + k, first + k, state, port)
+        if part & WRITE:
+            write_step(record, line + k, first + k, state, port)
     return steps, 0
 
 
@@ -103,8 +108,8 @@ class Simulation:
         self.world = self.system.world_under(*(self.law, self.effects) if self.compiled else (Penalty(),))
         self.port = self.system.make_port(self.coupling, self.effects, external=device is not None)
         self.link = None if device is None else DeviceLink(device, self.world, self.state, self.port)
-        self._couple, self._advance, self._render = Entry(couple), Entry(advance), Entry(render)
-        self._move, self._write, self._steps = Entry(move_device), Entry(write_step), Entry(compiled_steps)
+        self._couple, self._render, self._move = Entry(couple), Entry(render), Entry(move_device)
+        self._write, self._steps = Entry(write_step), Entry(compiled_steps)
         self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
 
@@ -146,17 +151,15 @@ class Simulation:
 
     def begin_step(self) -> None:
         """Do the first half of a step: apply hand and coupling, advance the law, send the device its force."""
-        world, state, port = self.world, self.state, self.port
+        world, state, port = blocks = self.world, self.state, self.port
         if self._planned:
             port.wrench[:] = wrench_of(self.scene, self.time)
-        self._couple(world, state, port)
         if self.compiled:
-            status = self._advance(world, state, port.applied)
-            if status:
-                raise IapbError(FAILURES[status])
+            self._do(PULL)
         else:
+            self._couple(*blocks)
             self._take(self.law.advance(self.system, state, port.applied, self.system.dt))
-        self._render(world, state, port)
+            self._render(*blocks)
         if self.link is not None:
             self.link.send()
 
@@ -164,13 +167,29 @@ class Simulation:
         """Do the second half of a step: move the device or read it."""
         if self.link is not None:
             self.link.receive()
+        elif self.compiled:
+            self._do(MOVE)
         elif self.port.coupling != NO_COUPLING and not self._move(self.world, self.state, self.port):
             raise IapbError(FAILURES[DEVICE_NOT_FINITE])
         self.steps_done += 1
 
+    def _do(self, part: int) -> None:
+        """Do one part of a compiled step."""
+        _, status = self._steps(self.world, self.state, self.port, self._unwritten, part, self.steps_done, 1)
+        if status:
+            raise IapbError(FAILURES[status])
+
+    @cached_property
+    def _unwritten(self) -> Any:
+        """A record without lines, for steps that are not recorded."""
+        return Recorder(self).blank(1)[0]
+
     def write(self, record: Any, line: int) -> None:
-        """Write the last step to a line of a record."""
-        self._write(record, line, self.steps_done - 1, self.state, self.port)
+        """Write the last step to the next line of a record, the line with the number `line`."""
+        if self.compiled:
+            self._steps(self.world, self.state, self.port, record, WRITE, self.steps_done - 1, 1)
+        else:
+            self._write(record, line, self.steps_done - 1, self.state, self.port)
 
     def _grip(self, hand_force: ArrayLike) -> None:
         if self.system.tool_tree < 0:
@@ -205,20 +224,18 @@ class Simulation:
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 
-    def prepare(self, record: Any, *, singly: bool = False) -> None:
-        """Load or compile the machine code of chunks, or of steps called `singly`, before the first step is timed."""
-        world, state, port = blocks = self.world, self.state, self.port
-        if self.compiled and self.link is None and not singly:
-            self._steps(*blocks, record, self.steps_done, 0)
+    def prepare(self) -> None:
+        """Load or compile the machine code before the first step is timed."""
+        _, state, port = blocks = self.world, self.state, self.port
+        if self.compiled:
+            self._steps(*blocks, self._unwritten, WHOLE, self.steps_done, 0)
             return
         self._couple.taking(*blocks)
         self._render.taking(*blocks)
-        self._write.taking(record, 0, 0, state, port)
-        if self.compiled:
-            self._advance.taking(world, state, port.applied)
+        self._write.taking(self._unwritten, 0, 0, state, port)
         if self.link is None and port.coupling != NO_COUPLING:
             self._move.taking(*blocks)
-        if not self.compiled and self.keeps_no_state:  # a law in Python takes a first step, which is then undone
+        if self.keeps_no_state:  # a law in Python takes a first step, which is then undone
             before = [array.copy() for array in self.arrays()]
             with suppress(IapbError):  # the first step will say so
                 self.step()
@@ -230,7 +247,7 @@ class Simulation:
         """Do and record up to `steps` steps; return the number done, and the exception that stopped them or None."""
         if self.compiled and self.link is None:
             planned, stop = self._plan(steps)
-            done, status = self._steps(self.world, self.state, self.port, record, self.steps_done, planned)
+            done, status = self._steps(self.world, self.state, self.port, record, WHOLE, self.steps_done, planned)
             self.steps_done += done
             return done, IapbError(FAILURES[status]) if status else stop
         for k in range(steps):

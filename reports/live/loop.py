@@ -64,7 +64,7 @@ class Loop:
         self._line = 0
         self._spare: tuple[Any, Floats] | None = None
         self._record, self._ticks = self._blank(ticks)
-        simulation.prepare(self._record, singly=True)
+        simulation.prepare()
 
     def run(self) -> str:
         """Run all ticks, or those before Ctrl-C or a failure; return why the loop stopped early, "" if it did not.

@@ -138,7 +138,7 @@ def replay(live: LiveRun) -> Run:
     while recorder.steps < run.steps:
         record, size = recorder.blank(run.steps)
         if not recorder.steps:
-            simulation.prepare(record, singly=True)
+            simulation.prepare()
         for line, row in enumerate(timetable.rows[recorder.steps:][:size]):
             simulation.state.row_budget[0], simulation.port.wrench[:] = row[3], row[4:]
             simulation.begin_step()

@@ -49,7 +49,7 @@ class RecordedLoop:
         while self.recording.steps < self.steps:
             record, size = self.recording.blank(self.steps)
             if self.recording.steps == 0:
-                simulation.prepare(record)  # the timed call contains steps only
+                simulation.prepare()  # the timed call contains steps only
             (done, stop), spent = timed(partial(simulation.advance_chunk, record, size))
             self.recording.keep(record, done, spent)
             total += spent
