@@ -51,7 +51,8 @@ _MOTION = {"depth": "penetration [mm]", "apart": "largest distance of tool and d
            "settled": "settled at [s]"}
 _FORCES = {"Fx": "peak |Fx| [N]", "Fy": "peak |Fy| [N]", "torque": "peak |τ| [N m]", "held Fx": "held Fx [N]",
            "held Fy": "held Fy [N]", "held torque": "held τ [N m]"}  # fmt: skip
-_FROM_IDEAL = "Distances from the ideal trajectory are root mean squares over the whole run, on the device side. "
+_FROM_IDEAL = ("Distances from the ideal path of the hand are root mean squares from the first contact until all "
+               "worlds settle, as in C10. ")
 _SETTLED = "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
 _HELD = ("Held: mean over the last fifth of the run. The hand pushes with Fx = −0.32 N, Fy = 0.4 N, so a world in "
          "balance holds 0.32 and −0.4 N.")  # fmt: skip
@@ -67,7 +68,8 @@ def _recipe(number: int, runs: Mapping[str, str], forces: bool) -> Recipe:
     def draw(*given: Run) -> Drawn:
         named = dict(zip(runs, given, strict=True))
         traces = {curve: measures.trace_of(run) for curve, run in named.items()}
-        measured = {curve: _measured(trace, traces.get("ideal")) for curve, trace in traces.items()}
+        window = measures.comparison_window([*traces.values()])
+        measured = {curve: _measured(trace, traces.get("ideal"), window) for curve, trace in traces.items()}
         told: dict[str, Any] = {**measured, "tilt": DEGREES * next(iter(traces.values())).device[0, 2],
                                 "damping": (given[0].scene_resolved["device"]["damping"] or [0.0])[0]}  # fmt: skip
         panels, shown, note = ((_forces(key, traces), _FORCES, _HELD) if forces else
@@ -86,7 +88,7 @@ def _recipe(number: int, runs: Mapping[str, str], forces: bool) -> Recipe:
     return recipe(key, *runs.values())(draw)
 
 
-def _measured(trace: Trace, ideal: Trace | None) -> dict[str, Any]:
+def _measured(trace: Trace, ideal: Trace | None, window: slice) -> dict[str, Any]:
     """Return the numbers of one curve, by the names that tables and texts use: [mm], [°], [s], [N] and [N m]."""
     force, state, peaks = trace.device_force, measures.settled_at(trace), measures.peak_force(trace)
     held = force[-max(int(_LAST_PART * len(force)), 1) :].mean(axis=0)
@@ -100,7 +102,7 @@ def _measured(trace: Trace, ideal: Trace | None) -> dict[str, Any]:
         "pulse": " and ".join(pulse), **dict(zip(_FORCES, (*peaks.tolist(), *held.tolist()), strict=True)),
     }  # fmt: skip
     if ideal is not None:
-        x, y, angle = measures.root_mean_square(trace, ideal, slice(None)).tolist()
+        x, y, angle = measures.root_mean_square(trace, ideal, window).tolist()
         past = np.abs(trace.device[-1] - ideal.device[-1])
         found |= {"x": MILLI * x, "y": MILLI * y, "angle": DEGREES * angle, "distance": MILLI * np.hypot(x, y),
                   "past x": MILLI * past[0], "past y": MILLI * past[1]}  # fmt: skip
