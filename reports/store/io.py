@@ -437,18 +437,23 @@ def read_values(group: Any, name: str, budget: Budget) -> Any:
     ValueError
         It states more values than its bytes can hold, or fills more than the budget.
     """
-    return read_dataset(dataset_of(group, name, budget), budget)
+    return read_dataset(_found(group, name, budget), budget)
 
 
 def dataset_of(group: Any, name: str, budget: Budget) -> Any:
     """Return a dataset of `group` without reading its values; it raises the errors of `read_values`."""
+    dataset = _found(group, name, budget)
+    check_size(dataset, budget)
+    return dataset
+
+
+def _found(group: Any, name: str, budget: Budget) -> Any:
     import h5py
 
     within = isinstance(group, h5py.Group)  # "get" would read a whole dataset, of any stated length
     dataset = group.get(name) if within else None
     if not isinstance(dataset, h5py.Dataset):
         raise RunFileError(f"{budget}: {group.name}/{name} is missing")
-    check_size(dataset, budget)
     return dataset
 
 
