@@ -42,7 +42,8 @@ $(PROJECT_STAMP): $(LOCK_STAMP)
 	@touch $@
 
 .PHONY: test
-test: lint types imports pytest ## ruff, mypy, import contracts and the quick tests
+test: setup ## ruff, mypy, import contracts and the quick tests, beside each other
+	@$(MAKE) --no-print-directory --jobs 4 lint types imports pytest
 
 .PHONY: reproduce
 reproduce: setup ## regenerate every figure, table and claim into out/report.html; FULL=1 for the deep version
