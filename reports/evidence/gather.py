@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from iapb.errors import IapbError
+from reference.one_thread import one_thread
 from reports import batches
 from reports.evidence import runs
 from reports.evidence.depends import depends_of
@@ -113,6 +114,7 @@ def _failed(stage: Stage) -> Finding:
     return failed_topic(stage.name, stage.failures[-1])
 
 
+@one_thread()
 def _fill(stage: Stage, runner: Runner, depth: str, progress: Progress, ahead: Stage | None = None) -> Stage:
     """Read or compute the records of a stage, unless it has been done; `ahead` has tables of its checks."""
     plan, said = plans()[stage.name], partial(progress, stage.name)
