@@ -68,8 +68,8 @@ class HardCase:
     exact_jacobian: Exact | None = field(default=None)
     well_posed: bool = True
     methods: tuple[str, ...] | None = None
-    law: ClassVar[str] = ("the velocity by equation (21) without rounding, in exact fractions; if e differs between "
-                          "contacts, by Poisson's law (impulse of the rebound = e times that of the compression)")
+    law: ClassVar[str] = ("the velocity by equation (21), in exact fractions; if e differs between contacts, the "
+                          "velocity by Poisson's law (impulse of the rebound = e times the impulse of the compression)")
 
     @property
     def meant_jacobian(self) -> Exact:
@@ -105,8 +105,8 @@ class FrictionalCase(HardCase):
 
     tangent: Floats = field(kw_only=True)
     friction: float = field(kw_only=True)
-    law = ("Newton's law of restitution with Coulomb friction; if this gains energy, the friction impulse is scaled "
-           "down until the gain is zero; in exact fractions and ball arithmetic")
+    law = ("Newton's restitution law with Coulomb friction, in exact fractions and ball arithmetic. If these laws gain "
+           "energy, the friction impulse is scaled down until the gain is zero")
 
     @property
     def all_rows(self) -> Exact:

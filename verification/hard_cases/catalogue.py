@@ -50,16 +50,16 @@ def _named(*cases: Callable[[], AnyCase] | str) -> dict[str, Callable[[], AnyCas
 
 HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     "no_contact": partial(numerical.contacts, 0, "No contact at all",
-                          "empty matrices, which libraries treat differently", "nothing happens, and no error"),
-    "one_contact": partial(numerical.contacts, 1, "One contact", "it is easy: every method must solve it",
+                          "libraries treat empty matrices differently", "the velocity does not change, without an error"),
+    "one_contact": partial(numerical.contacts, 1, "One contact", "the case is easy: every method must solve it",
                            "the textbook velocity (19), v⁺ = v⁻ − (1 + e) M⁻¹Jᵀ (J M⁻¹Jᵀ)⁻¹ J v⁻, up to rounding"),
     "hundred_contacts": partial(numerical.contacts, 100, "100 contacts of rank three",
                                 "97 redundant rows, each exact in doubles",
-                                "exact rank, and the velocity that three contacts give"),
+                                "the exact rank, and the velocity that three independent contacts give"),
     **_named(numerical.thousand_copies),
     "ten_thousand_contacts": partial(numerical.contacts, 10_000, "10,000 contacts of rank three",
-                                     "time and memory: the Delassus matrix has 1e8 entries", "linear time and exact "
-                                     "rank; methods that form the Delassus matrix need more than 2 s"),
+                                     "time and memory: the Delassus matrix has 1e8 entries", "time in proportion to "
+                                     "the contacts, exact rank; methods that form the Delassus matrix exceed 2 s"),
     **_named(
         "nearly_parallel_normals", numerical.printed_formula_gains, numerical.hilbert_rows, numerical.kahan_rows,
         "mass_ratio", "tiny_lever_arm", "straight_arm", "face_at_three_points", "grazing", "subnormal_speeds",
@@ -75,13 +75,13 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         shared_problems.bowl, 21, "43 contacts of mixed scales", "one direction is a million times lighter than the "
         "others, so its rounding hides them", "all directions are found", 0.5),
     "wall_at_the_bound": partial(motions.wall, 1, "the largest stiffness for which passivity is proved",
-                                 "in no world does the wall give energy"),
+                                 "the wall creates energy in no world"),
     "wall_beyond_the_bound": partial(
         motions.wall, 500, "a penalty wall throws the tool back faster than it arrived",
-        "the wall gives no energy: with an impulse, the spring gives back less than the impulse has taken"),
+        "the wall creates no energy: with IAPB the spring returns less than the first impulse has taken"),
     "wall_far_beyond_the_bound": partial(
-        motions.wall, 2000, "only the spring acts while the contact lasts, and one time step is as long as a bounce",
-        "an ideal wall gives no energy. We expect IAPB and PB to fail, because the spring gives back more than an "
+        motions.wall, 2000, "while the contact lasts only the spring acts, and a bounce takes about two time steps",
+        "a rigid wall creates no energy. We expect IAPB and PB to fail, because the spring returns more energy than an "
         "impulse has taken"),
     **_named(motions.wedged_peg_motion),
     "touching_cradle": partial(motions.cradle, 0.0, "touching exactly"),
@@ -90,11 +90,11 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     "cradle_a_micrometre_sunk": partial(motions.cradle, -1e-6, "sunk by a micrometre"),
     **_named(friction.double_pendulum_motion),
     "sticking_threshold": partial(friction.pushed, 0.99, "Sticking, 1 % below the threshold",
-                                  "it sticks. All worlds have Coulomb's law here; with the paper's law (6), which is "
-                                  "viscous below 1 mm/s, it would creep"),
+                                  "the block sticks. All worlds have Coulomb's law here; with the paper's law (6), "
+                                  "which is viscous below 1 mm/s, the block would creep"),
     "sliding_threshold": partial(friction.pushed, 1.01, "Sliding, 1 % above the threshold",
-                                 "it slides by ½ 0.01 μ g t². All worlds have Coulomb's law here; with the paper's law "
-                                 "(6), which is viscous below 1 mm/s, it would be nearly t × 1 mm/s ahead"),
+                                 "the block slides by ½ 0.01 μ g t². All worlds have Coulomb's law here; with the "
+                                 "paper's law (6), viscous below 1 mm/s, it would slide nearly t × 1 mm/s farther"),
     **_named(friction.creep_of_the_regularised_law, friction.painleve_rod, friction.stick_slip, sticking.nudged_box),
     "box_on_a_slope": partial(sticking.on_a_slope, "Box that sticks on a slope", "box_on_a_slope", 1, sticking.BOX),
     "stack_on_a_slope": partial(sticking.on_a_slope, "Stack that sticks on a slope", "stack_on_a_slope", 3,

@@ -25,19 +25,19 @@ from verification.table import Table
 
 ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
 _NOTES = {
-    "impact": "Stable: gain and error at most those allowed, relative restitution residual at most 1e-8. Gain: (KE⁺ − "
-              "KE⁻)/KE⁻, exactly. Error: |v⁺ − truth| / |v⁻| in the kinetic metric; allowed is what rounding may cause "
-              "with a backward stable method, 10 n ε √κ_M (√κ_M + κ_A): n is the larger of c rows and d coordinates, "
-              "κ_M the condition number of M scaled to a unit diagonal, κ_A that of A = J L⁻ᵀ with M = L Lᵀ. Smallest "
-              "error detected: the smallest relative error that, added to a correct impulse or velocity, makes the "
-              "verdict fail. Time: median of a call.",
-    "motion": "Stable: gain and error at most those allowed (what rounding or the time step may cause), restitution "
-              "residual at most 1e-8. Gain: the largest amount of energy created, relative to the kinetic energy at "
-              "the start plus the work of hand and gravity. Error: distance from the exact law, relative to its "
-              "answer. Restitution residual: the largest of all collisions; in a collision of several contacts, their "
-              "mean, weighted by the impulses. Smallest error detected: the smallest relative error which, put into "
-              "the displacements and changes of velocity of a stable motion, changes the verdict. Time: median of a "
-              "step.",
+    "impact": "Stable: gain and error at most those allowed, relative restitution residual at most 1e-8. Energy gain: "
+              "(KE⁺ − KE⁻)/KE⁻, exactly. Forward error: |v⁺ − truth| / |v⁻| in the kinetic metric. A backward stable "
+              "method may gain 10 d ε √κ(M) of the energy and have an error of 10 n ε √κ_M (√κ_M + κ_A) by rounding: n "
+              "is the larger of c rows and d coordinates, κ_M the condition number of M scaled to a unit diagonal, κ_A "
+              "that of A = J L⁻ᵀ with M = L Lᵀ. Smallest error detected: added to a correct impulse or velocity, a "
+              "relative error of this size changes the verdict. Time: median of a call.",
+    "motion": "Stable: gain and error are at most those allowed (what rounding or the time step may cause), the "
+              "restitution residual is at most 1e-8. Energy gain: the largest amount of energy created, relative to "
+              "the kinetic energy at the start plus the work of hand and gravity. Forward error: distance from the "
+              "known motion, relative to a length or speed of that motion. Restitution residual: the largest of all "
+              "collisions; in a collision of several contacts, the mean of the contacts, weighted by their impulses. "
+              "Smallest error detected: added to displacements and changes of velocity of a stable motion, a relative "
+              "error of this size changes the verdict. Time: median of a step.",
 }  # fmt: skip
 
 
@@ -58,8 +58,8 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     failing = [f"{name}” ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
     skipped = len(cases) - len(tried)
     stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
-    sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer, and gains no more energy "
-                "than rounding or the time step allow." + (f" It fails in “{'; “'.join(failing)}." if failing else "")
+    sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer and gains no more energy "
+                "than rounding or the time step explain." + (f" It fails in “{'; “'.join(failing)}." if failing else "")
                 + (f" {skipped} cases were skipped because their files are absent." if skipped else ""))  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
     question = "Is the engine stable on problems on which other methods fail?"

@@ -49,9 +49,9 @@ def double_pendulum_motion() -> TrajectoryCase:
     return TrajectoryCase(
         "Kane and Levinson's double pendulum, its motion", _SOURCE,
         "a bounce with friction may throw the tip higher than the height from which it fell",
-        "the energy never exceeds that at the start, which Newton's and Coulomb's laws alone do not guarantee",
-        "kinetic plus potential energy never exceeds that at the start; until the tip touches, the motion is that of "
-        "the equations of two rods, integrated to twelve digits",
+        "the energy never exceeds its initial value; Newton's and Coulomb's laws alone do not guarantee this",
+        "kinetic plus potential energy never exceeds its initial value; until the tip touches, the motion follows "
+        "from the equations of two rods, integrated to twelve digits",
         on_floor("kane_levinson", "Kane and Levinson's double pendulum on a rough floor", _PENDULUM, _ON_TIP,
                  source=_SOURCE, rate=2000, duration=0.5, level=_FLOOR),
         _measure_pendulum, worlds=("IAPB", "PB", "ideal", COULOMB),
@@ -121,7 +121,7 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
     return TrajectoryCase(
         "Creep of the regularised law, 1 % below the threshold", "(6) of the paper",
         "the paper's law (6) never sticks: the block must creep at the speed that the law gives, no faster",
-        "it creeps at 0.99 times 1 mm/s, the speed below which (6) is viscous, after a few steps",
+        "after a few steps the block creeps at 0.99 times 1 mm/s, the speed below which (6) is viscous",
         "equation (6) of the paper for one coordinate, step by step", _block(0.99, "regularised"), measure,
         ("IAPB", "PB"),
     )  # fmt: skip
@@ -150,7 +150,7 @@ def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
 
     return TrajectoryCase(
         name, "Coulomb's law",
-        "a change of one per cent in the force decides whether the block moves", expected,
+        "a change of the force by one per cent decides whether the block moves", expected,
         f"Coulomb's law in closed form: {slide * 1e3:.4g} mm after {_DURATION:g} s",
         _block(share), measure, _WORLDS,
     )  # fmt: skip
@@ -175,8 +175,8 @@ def painleve_rod() -> TrajectoryCase:
         "Painlevé (1895); Génot and Brogliato (1999); Stewart (2000)",
         "the effective inertia of the sliding contact is negative: no acceleration of rigid bodies satisfies the laws, "
         "and with springs the force grows without bound",
-        "it jams: with a rigid contact at once, with a spring as soon as the force is large enough",
-        f"with springs the slip, by the equations of motion, stops after {1e3 * _slipping()[0]:.1f} ms; rigid: at once",
+        "the rod jams: with a rigid contact at once, with a spring as soon as the force is large enough",
+        f"the equations of motion: with springs the slip stops after {1e3 * _slipping()[0]:.1f} ms; if rigid, at once",
         on_floor("painleve_rod", "Painlevé's rod", [_ROD], _ON_END, source="Painlevé (1895)", rate=4000, duration=0.1),
         _measure_rod, _WORLDS,
     )  # fmt: skip
@@ -254,10 +254,10 @@ def stick_slip() -> TrajectoryCase:
     return TrajectoryCase(
         "Stick-slip oscillator and its limit cycle",
         "Den Hartog, Trans. ASME 53 (1931); the textbooks' block on a belt",
-        "a plate pushed by a spring: in the limit cycle it is at rest for only an instant of each period, with the "
+        "a spring pushes a plate: in the limit cycle the plate is at rest for only an instant of each period, with the "
         "friction force exactly at its limit μ m g",
         "the plate slides, sticks once, and then repeats the limit cycle, of period 2π/ω, for ever",
-        "closed form: harmonic while it slides, at rest while the spring presses less than μ m g; limit cycle "
+        "closed form: harmonic while the plate slides, at rest while the spring presses less than μ m g; limit cycle "
         "v = V (1 − cos ωt), with V the speed of the spring's other end and ω the frequency of the plate on the spring",
         on_floor("stick_slip", "A plate pushed by a spring", [plate, presses], contact, rate=4000, duration=_PRESSED),
         measure, ("IAPB", "PB"),

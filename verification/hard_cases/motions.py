@@ -27,8 +27,8 @@ def chatter() -> TrajectoryCase:
     return TrajectoryCase(
         "Contact chatter: infinitely many bounces in 0.43 s", "Zeno's bouncing ball; textbook",
         "the bounces accumulate at one instant: an event-driven method never passes it, time stepping may bounce on",
-        "the parabolas as far as the time step resolves them, then rest",
-        f"parabolas of heights h e²ᵏ in closed form, at rest from {_END_OF_BOUNCES:.4f} s on",
+        "the ball follows the parabolas as far as the time step resolves them, then it rests",
+        f"closed form: after bounce k a parabola of height h e²ᵏ; at rest from {_END_OF_BOUNCES:.4f} s on",
         on_floor("chatter", "A ball that chatters to rest", [ball("ball", _RADIUS, _RADIUS + _HEIGHT, axis=[0, 1])],
                  _HARD, duration=1.0), _measure_chatter,
     )  # fmt: skip
@@ -77,8 +77,8 @@ def wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
 
     return TrajectoryCase(
         name, "Colgate and Schenkel, J. Robotic Systems 14 (1997); scenes/wall_1d.yaml", why_hard, expected,
-        "up to the bound, Colgate and Schenkel's theorem guarantees passivity; beyond it, we measure the energy that "
-        "is created. The reference motion is the recursion of tool, device and sampled wall in one coordinate",
+        "up to the bound, Colgate and Schenkel's theorem guarantees passivity; beyond the bound, we measure the energy "
+        "gain. The reference motion comes from a recursion for tool, device and sampled wall in one coordinate",
         load_scene(find_scene("wall_1d")).with_values(values), measure,
     )  # fmt: skip
 
@@ -119,9 +119,9 @@ def wedged_peg_motion() -> TrajectoryCase:
         "A peg wedged in its hole, its motion",
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
         "six gaps close in the same step; then the springs of six contacts carry the hand force",
-        "at rest at the end of the hole, no deeper than six springs allow",
+        "the peg rests at the end of the hole, as deep as the springs of its six contacts allow",
         "statics: 2 K δ + 4 K s² δ = F, with depth δ, hand force F, stiffness K of a contact, and s the sine of the "
-        "angle between the sides and the motion; rigid: δ = 0",
+        "angle between the sides and the motion; with rigid contacts δ = 0",
         load_scene(find_scene("peg_hole")), _measure_peg,
     )  # fmt: skip
 
@@ -166,8 +166,8 @@ def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
 
     return TrajectoryCase(
         f"Newton's cradle, {words}", "textbook; the paper's rows (12)",
-        "new contacts transmit momentum by impulses, lasting ones by springs; rounding may decide which are new",
-        "momentum is conserved and no energy created, whichever ball leaves",
-        "momentum and energy of five equal elastic balls: Σ v = 1 and Σ v² = 1",
+        "new contacts transmit momentum by impulses, lasting ones by springs; rounding may decide if one is new",
+        "momentum and energy are conserved, whichever balls leave",
+        "momentum and energy of five equal elastic balls, the first at 1 m/s: Σ v = 1 and Σ v² = 1",
         scene, measure,
     )  # fmt: skip

@@ -11,7 +11,7 @@ def thousand_copies() -> HardCase:
     """One contact reported a thousand times."""
     return HardCase(
         "1,000 copies of one contact", "collision detectors on flat faces",
-        "the Delassus matrix is 1000 × 1000 of rank one; p is not unique",
+        "the Delassus matrix has 1000 × 1000 entries and rank one; the impulses are not unique",
         "the outcome of a single contact, with every method that allows redundant rows",
         np.array([[2.0, 0.3, 0.1], [0.3, 1.0, 0.2], [0.1, 0.2, 0.5]]), np.tile([0.6, 0.8, -0.25], (1000, 1)),
         np.array([-1.0, -2.0, 0.5]), 0.5, methods=("factored", "gram_pinv", "damped", "svd"),
@@ -38,8 +38,8 @@ def printed_formula_gains() -> HardCase:
     return HardCase(
         "Rows 1e-4 apart on κ(M) = 1e6, elastic",
         "number 6 of our errata of the paper (docs/theory.md); normal equations: Higham, Accuracy and Stability (2002)",
-        "κ(W) is 1e8 from the rows times 1e6 from M: its small singular values are noise",
-        "no energy is gained; the printed formula inverts noise",
+        "κ(W) is about 1e14 (1e8 from the rows, 1e6 from M), so its small singular values are noise",
+        "no energy is gained. We expect the printed formula to fail, because it inverts noise",
         mass, rows, rng.normal(size=d), 1.0,
     )  # fmt: skip
 
@@ -57,8 +57,8 @@ def hilbert_rows() -> HardCase:
     rows = 1.0 / (np.arange(n)[:, None] + np.arange(n) + 1.0)
     return HardCase(
         "Hilbert rows, n = 8", "Hilbert (1894); the classical rank decision",
-        "the exact rank is full, the condition number 1.5e10: singular values lie on both sides of any usual tolerance",
-        "restitution is met and no energy is gained; the rank is not judged",
+        "the exact rank is 8, the condition number 1.5e10: singular values lie on both sides of any usual tolerance",
+        "the restitution law holds and no energy is gained; the rank is not judged",
         np.eye(n), rows, np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]), 0.5, well_posed=False,
     )  # fmt: skip
 
@@ -70,7 +70,7 @@ def kahan_rows() -> HardCase:
     rows = s ** np.arange(n)[:, None] * (np.eye(n) - c * np.triu(np.ones((n, n)), 1))
     return HardCase(
         "Kahan rows, n = 24", "Kahan, Numerical linear algebra (1966): rank revealed wrongly by pivoted factorizations",
-        "smallest singular value far below every pivot", "restitution is met and no energy is gained",
+        "the smallest singular value is far below every pivot", "the restitution law holds and no energy is gained",
         np.eye(n), rows, np.cos(np.arange(n)), 0.8, well_posed=False,
     )  # fmt: skip
 
@@ -83,7 +83,7 @@ def light_direction() -> HardCase:
     return HardCase(
         "Velocity along M's lightest direction, κ(M) = 1e12",
         "backward error of Cholesky's factor: Higham, Accuracy and Stability (2002), chapter 10",
-        "Cholesky's backward error, with the bound d ε κ(M) = 1e-3, here changes the energy's fifth digit",
-        "no gain with the clamp; for other methods up to 10 d ε √κ(M) is allowed",
+        "the error of Cholesky's factor, up to d ε κ(M) = 1e-3, here changes the fifth digit of the energy",
+        "no energy is gained with the clamp; other methods may gain up to 10 d ε √κ(M) of the energy",
         mass, rows, axes[:, -1], 1.0,
     )  # fmt: skip

@@ -53,9 +53,9 @@ def nudged_box() -> TrajectoryCase:
 
     return TrajectoryCase(
         "Nudged box", "Coulomb's law; a box on a floor",
-        "a friction force that is held over a step reverses the motion and drives the box across the floor",
-        "it stops where Coulomb's law predicts and stays there",
-        f"Coulomb's law in closed form: v²/(2 μ g) = {1e3 * way:.4g} mm",
+        "a friction force that is constant over a step can reverse the motion and drive the box across the floor",
+        "the box stops where Coulomb's law predicts and stays there",
+        f"Coulomb's law in closed form: the box slides by v²/(2 μ g) = {1e3 * way:.4g} mm",
         _boxes("nudged_box", "A nudged box", 1, BOX, 0.0, speed), measure, _ENGINE,
     )  # fmt: skip
 
@@ -73,8 +73,8 @@ def on_a_slope(title: str, name: str, count: int, sort: tuple[float, float, floa
     return TrajectoryCase(
         title, "Coulomb's law; springs of (5)",
         "a sticking contact must not creep; lever arms couple normal and friction forces",
-        f"it moves by {1e6 * leans:.3g} μm as its springs deflect, and then stays",
-        "no contact slips, because tan 20° < μ; the springs between two faces deflect under force and moment",
+        f"the {'upper ' * (count > 1)}box moves by {1e6 * leans:.3g} μm as the contact springs deflect, then stays",
+        "no contact slips, because tan 20° < μ; force and moment deflect the contact springs between two faces",
         _boxes(name, title, count, sort, slope, 0.0), measure, _ENGINE,
     )  # fmt: skip
 
