@@ -11,7 +11,7 @@ from reference.simulators.scene import UPRIGHT, Cuboid, FixedScene, Quaternion, 
 from reference.simulators.simulator import Settings, Simulator, damping_for
 from reference.simulators.trajectory import Samples, Trajectory, steps_between_samples
 
-NO_RESTITUTION = "no e; a spring and damper stands in for it, so stiff that one impact ends before the next begins"
+NO_RESTITUTION = "no e; a spring and damper replace it, so stiff that one impact ends before the next begins"
 OWN_STEP, STACK_STEP, DEFAULT_STEP = 1e-5, 2e-5, 2e-3  # [s] for bouncing, for the stack, and the engine's default
 # A spring's half period in steps. With fewer, the step adds or removes energy; with more, impacts overlap in time.
 OWN_STEPS_OF_AN_IMPACT = 100.0
@@ -39,7 +39,7 @@ class MuJoCo(Simulator):
             loaded = np.ptp(scene.masses) >= MANY_TIMES_HEAVIER * scene.masses.min()
             chosen = step or (STACK_STEP if loaded else DEFAULT_STEP)
             solref, solimp = LOADED_AT_GIVEN_STEP if loaded and step else AT_REST
-            note = "at 1 ms no setting of the grid makes the stack stand; this one moves least"
+            note = "at 1 ms the stack stands with no setting of the grid; with this one it moves least"
             return Settings(chosen, {**common, "solref": solref.format(2.0 * chosen), "solimp": solimp},
                             note if loaded and step else "")
         chosen, integrator, steps = OWN_STEP, "Euler", OWN_STEPS_OF_AN_IMPACT

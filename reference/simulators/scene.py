@@ -159,7 +159,7 @@ _CLEAR = 0.0103  # distance of falling boxes from what they strike [m]
 _FEET = tuple(Cuboid((0.02,) * 3, (x, y, -0.04)) for x in (-0.04, 0.04) for y in (-0.04, 0.04))
 _HEAVY, _LIGHT = after_all_collisions(MASS_RATIO_OF_BALLS)
 _ACROSS = 0.2 * sqrt(3.0)  # 2 sqrt(3)/5 along normals at 30 degrees
-_LANDS = "e = 1/2: it leaves flat at half the speed"
+_LANDS = "e = 1/2: the box leaves flat at half its speed"
 
 FIXED_SCENES: dict[str, FixedScene] = {scene.name: scene for scene in (
     # five equal balls, 4 mm apart, so that the collisions are successive
@@ -174,7 +174,7 @@ FIXED_SCENES: dict[str, FixedScene] = {scene.name: scene for scene in (
                 _ball("lower", 1.0, 0.0, -RADIUS, 0.0)), (), 1.0, 0.1, 2.0 * RADIUS,
                final_velocities=((-0.2, 0.0, 0.0), (0.6, _ACROSS, 0.0), (0.6, -_ACROSS, 0.0))),
     # a ball of 100 kg drives one of 1 kg against a wall: 31 collisions (Galperin 2003)
-    FixedScene("two_balls_and_a_wall", "Two balls and a wall", "31 elastic collisions, all energy kept",
+    FixedScene("two_balls_and_a_wall", "Two balls and a wall", "31 elastic collisions, which conserve all energy",
                (_ball("heavy", MASS_RATIO_OF_BALLS, -1.1, 0.0, 1.0), _ball("light", 1.0, -0.55, 0.0, 0.0)),
                (Obstacle("wall", (0.5, 2.0, 2.0), (0.25, 0.0, 0.0)),), 1.0, 3.0, 2.0 * RADIUS,
                final_velocities=((_HEAVY, 0.0, 0.0), (_LIGHT, 0.0, 0.0))),
@@ -186,16 +186,16 @@ FIXED_SCENES: dict[str, FixedScene] = {scene.name: scene for scene in (
                (_box("box", 1.0, 0.5 * SIDE + _CLEAR, _FEET, fall=1.0),), (FLOOR,), 0.5, 0.05, SIDE,
                final_velocities=((0.0, 0.0, 0.5),)),
     # a cube falls edge first into a right-angled groove, with eight corners at once; three are independent
-    FixedScene("redundant_wedge", "Redundant wedge", "elastic: it leaves as it came",
+    FixedScene("redundant_wedge", "Redundant wedge", "e = 1: the cube leaves with its initial speed",
                (_box("cube", 1.0, sqrt(2.0) * (0.5 * SIDE + _CLEAR), turn=_about_y(pi / 4), fall=1.0),),
                (_slope("left", -1.0), _slope("right", 1.0)), 1.0, 0.05, SIDE, final_velocities=((0.0, 0.0, 1.0),)),
     # four stacked boxes, each with a hundred times the mass of the one below
     FixedScene("heavy_stack", "Stack with mass ratio 10⁶",
-               "it stays; boxes of 1 g, 100 g, 10 kg and 1000 kg, the heaviest on top",
+               "no box moves; 1 g, 100 g, 10 kg and 1000 kg, the heaviest on top",
                tuple(_box(f"box {k + 1}", mass, (k + 0.5) * SIDE) for k, mass in enumerate((1e-3, 0.1, 10.0, 1000.0))),
                (FLOOR,), 0.0, 1.0, SIDE, WEIGHT),
-    FixedScene("resting_box", "Resting box", "it stays", (_box("box", 1.0, 0.5 * SIDE),), (FLOOR,), 0.0, 60.0, SIDE,
-               WEIGHT),
+    FixedScene("resting_box", "Resting box", "the box does not move", (_box("box", 1.0, 0.5 * SIDE),), (FLOOR,), 0.0,
+               60.0, SIDE, WEIGHT),
 )}  # fmt: skip
 
 

@@ -50,7 +50,7 @@ def _named(*cases: Callable[[], AnyCase] | str) -> dict[str, Callable[[], AnyCas
 
 HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     "no_contact": partial(numerical.contacts, 0, "No contact at all",
-                          "libraries treat empty matrices differently", "the velocity does not change, without an error"),
+                          "libraries treat empty matrices differently", "the velocity does not change; no error"),
     "one_contact": partial(numerical.contacts, 1, "One contact", "the case is easy: every method must solve it",
                            "the textbook velocity (19), v⁺ = v⁻ − (1 + e) M⁻¹Jᵀ (J M⁻¹Jᵀ)⁻¹ J v⁻, up to rounding"),
     "hundred_contacts": partial(numerical.contacts, 100, "100 contacts of rank three",
@@ -81,8 +81,8 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         "the wall creates no energy: with IAPB the spring returns less than the first impulse has taken"),
     "wall_far_beyond_the_bound": partial(
         motions.wall, 2000, "while the contact lasts only the spring acts, and a bounce takes about two time steps",
-        "a rigid wall creates no energy. We expect IAPB and PB to fail, because the spring returns more energy than an "
-        "impulse has taken"),
+        "a rigid wall creates no energy. We expect IAPB and PB to fail: so stiff a spring, evaluated once a "
+        "step, creates energy"),
     **_named(motions.wedged_peg_motion),
     "touching_cradle": partial(motions.cradle, 0.0, "touching exactly"),
     "touching_cradle_in_centimetres": partial(motions.cradle, 0.0, "touching but for rounding", 0.01),

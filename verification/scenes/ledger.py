@@ -15,6 +15,7 @@ from verification.scenes.books import (
     GAIN_SHARE,
     OPEN,
     OPEN_SHARE,
+    ORDER_SLACK,
     ROUNDING,
     WORTH_NAMING,
     as_declared,
@@ -89,13 +90,13 @@ def _of_contacts(table: Table) -> Iterator[Part]:
                        if row["most contacts in one step"])
     deepest, most = _most(rows, "most penetration"), _most(rows, "most rows in one impact")
     yield Part.of(
-        "Deepest overlap of bodies", f"{deepest['most penetration']:.2f} mm ({deepest['scene']}), at most {ratio:.0%} "
-        f"of the thinnest moving shape of the scene ({scene})", f"below {DEEP:.0%} of that shape",
+        "Deepest overlap of bodies", f"{deepest['most penetration']:.2f} mm ({deepest['scene']}); at most {ratio:.0%} "
+        f"of the thinnest moving shape of its scene ({scene})", f"below {DEEP:.0%} of that shape",
         REPRODUCED if ratio < DEEP else MIXED)
     gained = max(table.column(_ADDED))
     yield Part.of(
-        f"Largest energy gain of {sum(table.column('impacts'))} impacts, with up to "
-        f"{most['most rows in one impact']} rows at once ({most['scene']})",
+        f"Largest energy gain in one of {sum(table.column('impacts'))} impacts, which have up to "
+        f"{most['most rows in one impact']} rows ({most['scene']})",
         f"{gained:.0e} of the energy exchanged, summed in doubles", f"at most {ROUNDING:.0e}",
         REPRODUCED if gained <= ROUNDING else REFUTED)
     complete = sum(not row["how it ends"].startswith(STOPPED) for row in rows)
@@ -126,10 +127,10 @@ def _of_books(table: Table) -> Part:
     words = ", ".join(f"{row['scene']} {row[GAIN_SHARE]:.1f} %" for row in made)
     return Part.of(
         "The stored energy never exceeds the energy at the start plus the work done on the scene",
-        f"holds in {len(rows) - len(made)} of {len(rows)} scenes"
-        + (f". Elsewhere time stepping, not an impact, creates more than rounding: {words} of the energy exchanged"
+        f"holds up to rounding in {len(rows) - len(made)} of {len(rows)} scenes"
+        + (f". In the others time stepping, not an impact, creates energy: {words} of the energy exchanged"
            if made else ""), "all scenes", MIXED if made else REPRODUCED,
-        miss=f"in {len(made)} of {len(rows)} scenes the stored energy at some instant exceeds that at the start plus "
+        miss=f"in {len(made)} of {len(rows)} scenes the stored energy at some instant exceeds its initial value plus "
              f"the work done, by an error of time stepping ({words} of the energy exchanged)" if made else "")
 
 
@@ -142,15 +143,14 @@ def _of_residuals(table: Table) -> Iterator[Part]:
     below = ", ".join(f"{row['scene']} ({row['order measured']:.2f})" for row in short)
     yield Part.of(
         "The residual of the energy balance is rounding, or falls as the step is shortened",
-        f"rounding in {len(rows) - len(tried)} scenes; falls with an order of {orders[0]:.2f} to {orders[-1]:.2f} "
-        f"(median {float(np.median(orders)):.2f}) in {len(tried)} "
-        "scenes" + (f". Below the declared order: {below}" if short else ""),
-        f"order {max(row['order declared'] for row in tried)}, which the integrator declares",
+        f"rounding in {len(rows) - len(tried)} scenes; with order {orders[0]:.2f} to {orders[-1]:.2f} "
+        f"(median {float(np.median(orders)):.2f}) in {len(tried)} scenes" + (f"; too low: {below}" if short else ""),
+        f"order of the integrator, {max(row['order declared'] for row in tried)}, or at most {ORDER_SLACK} less",
         MIXED if short else REPRODUCED)
     wide = sorted((row for row in rows if row[OPEN] > WORTH_NAMING), key=lambda row: float(row[OPEN]), reverse=True)
-    said = ", ".join(f"{row['scene']} {row[OPEN]:.1f} %" for row in wide)
+    said = ", ".join(f"{row['scene']} {row[OPEN]:.3g} %" for row in wide)
     yield Part.of(
-        "Residual at the scene's own time step; the absolute values of motion and springs are added",
+        "Residual at the scene's own time step: the absolute residuals of motion and springs, added",
         f"larger in {len(wide)} of {len(rows)} scenes{said and ': ' + said}",
         f"at most {WORTH_NAMING:.0f} % of the energy exchanged", MIXED if wide else REPRODUCED,
         miss=f"in “{_title(wide[0]['scene'])}” the energy errors of the time steps add up to "
@@ -177,19 +177,19 @@ RESIDUALS = Check(
     cases=lambda study: scene_names(), says=_of_residuals, digits=3,
     row=lambda study, name: open_row(study.scene(name), lambda scene: study.run(scene, WORLD, keep=False),
                                      REFINEMENTS[study.depth]),
-    note="Residuals of the energy balance; the absolute values of motion and springs are added. A scene without an "
-    "order: its residual is rounding, and no shorter step was tried. The step for a residual of "
-    f"{WORTH_NAMING:g} % is the longest tried step that reaches it, or is extrapolated with the measured order.",
+    note="Residuals of the energy balance: the absolute residuals of motion and springs, added. If a scene has no "
+    f"order, its residual is rounding, and no shorter step was tried. The step for a residual of {WORTH_NAMING:g} % is "
+    "the longest tried step that reaches this residual; if none does, it is extrapolated with the measured order.",
 )
 BOOKS = Check(
     key="energy ledger", question="Does the stored energy ever exceed the energy at the start plus the work done?",
     cases=lambda study: scene_names(), row=lambda study, name: book_row(_run(study, name)), says=_of_books, digits=3,
-    note="End − start = work of hand and coupling − losses + residual. The residual is energy that time stepping "
-    "created (> 0) or lost (< 0). The residual of the motion comes from forces that are constant over a step. The "
-    "residual of the springs comes from evaluating them once a step and, in curved gaps, from pushing along J Δq "
-    "instead of the path of the touching points. The share adds both absolute values. A loss is a force times a path, "
-    "with the force constant over each step, so it can come out slightly negative. Shares are relative to the energy "
-    "exchanged.",
+    note="Energy at the end − at the start = work of hand and coupling − losses + residual. The residual is energy "
+    "that time stepping created (> 0) or lost (< 0). The residual of the motion comes from forces that are constant "
+    "over a step. The residual of the springs has two causes: springs are evaluated once a step, and at curved shapes "
+    "the touching points move along arcs while the step pushes along J Δq (“curved gaps”). “Residual by size” adds "
+    "the absolute residuals of motion and springs. A loss is the sum over steps of a constant force times a path, so "
+    "it can be slightly negative.",
 )
 OVER_TIME = Check(
     key="books over time", question="Where is the energy at each instant?", cases=lambda study: scene_names(),
@@ -203,19 +203,19 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     falls = sum(as_declared(row) for row in residuals)
     return (
         f"In {len(contacts)} scenes, {sum(row['dimensions'] == 3 for row in contacts)} of them three-dimensional, "
-        f"bodies overlap by at most {deepest['most penetration']:.2f} mm. The absolute energy errors of all time steps "
-        f"add up to at most {widest[OPEN]:.1f} % of the energy exchanged (“{_title(widest['scene'])}”). In {falls} of "
-        f"{len(residuals)} scenes this error is rounding, or shrinks with shorter steps as fast as the integrator's "
-        "order says."
+        f"bodies overlap by at most {deepest['most penetration']:.2f} mm. The energy errors of the time steps add "
+        f"up to at most {widest[OPEN]:.1f} % of the energy exchanged (“{_title(widest['scene'])}”). In {falls} of "
+        f"{len(residuals)} scenes this error is rounding, or falls with shorter steps as fast as the integrator's "
+        "order predicts."
     )
 
 
 scene_ledger = Topic(
     key="scene-ledger", title="The scenes",
-    question="Every scene file of the project is run in the world IAPB at its own time step. An energy balance "
-    "accounts for each run: the change of stored energy equals the work of hand and coupling minus the losses. The "
-    "rest, the residual, is the error of time stepping; it must fall with the integrator's order when the step is "
-    "shortened. Residuals are given as shares of the energy exchanged. The absolute residuals of the motion and of the "
-    "contact springs are added, so that opposite signs do not cancel.",
+    question="Every scene file of the project is run in the world IAPB at its own time step. For each run we compute "
+    "an energy balance: ideally, the change of stored energy equals the work of hand and coupling minus the losses. "
+    "The difference, the residual, is the error of time stepping. It must fall with the integrator's order when the "
+    "step is shortened. Residuals are shares of the energy exchanged. The residual of the motion and that of the "
+    "contact springs are added by absolute value, so that opposite signs do not cancel.",
     checks=(CONTACTS, RESIDUALS, BOOKS, OVER_TIME), says=_answer,
 )
