@@ -34,7 +34,7 @@ LAYERS = (
     (("lost friction",), "lost in friction", PURPLE),
 )
 LEGEND = {**{text: LineStyle(color, "s", width=0.0) for _, text, color in LAYERS},
-          "all energy so far": LineStyle(INK, width=1.2), "impact": LineStyle(FORCE, "|", width=0.0)}  # fmt: skip
+          "initial energy + work": LineStyle(INK, width=1.2), "impact": LineStyle(FORCE, "|", width=0.0)}  # fmt: skip
 _WIDTH, _ROW, _HEAD, _FOOT = 9.2, 0.46, 0.34, 0.12  # inches
 # heading -> left edge and width
 _COLUMNS = {"energy over time, each scene to its own scale": (0.235, 0.52), "deepest overlap": (0.785, 0.15)}

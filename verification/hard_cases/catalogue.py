@@ -70,10 +70,10 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
     ),
     "bowl_of_low_rank": partial(
         shared_problems.bowl, 5, "35 contacts of rank 5",
-        "35 contacts have rank 5; the five singular values range from 0.003 to 2", "rank 5, exactly plastic", 0.0),
+        "35 contacts have rank 5; the five singular values range from 0.003 to 2", "rank 5; v_n⁺ = 0", 0.0),
     "bowl_of_mixed_scales": partial(  # the eigenvalues of W range from 2e-4 to 4e5
         shared_problems.bowl, 21, "43 contacts of mixed scales", "one direction is a million times lighter than the "
-        "others, so its rounding hides them", "all directions are found", 0.5),
+        "others, so its rounding hides them", "the rank counts all directions", 0.5),
     "wall_at_the_bound": partial(motions.wall, 1, "the largest stiffness for which passivity is proved",
                                  "the wall creates energy in no world"),
     "wall_beyond_the_bound": partial(

@@ -189,7 +189,7 @@ BOOKS = Check(
     "over a step. The residual of the springs has two causes: springs are evaluated once a step, and at curved shapes "
     "the touching points move along arcs while the step pushes along J Δq (“curved gaps”). “Residual by size” adds "
     "the absolute residuals of motion and springs. A loss is the sum over steps of a constant force times a path, so "
-    "it can be slightly negative.",
+    "it can be slightly negative. Percentages are shares of the energy exchanged.",
 )
 OVER_TIME = Check(
     key="books over time", question="Where is the energy at each instant?", cases=lambda study: scene_names(),
