@@ -128,7 +128,7 @@ def _of_books(table: Table) -> Part:
     return Part.of(
         "The stored energy never exceeds the energy at the start plus the work done on the scene",
         f"holds up to rounding in {len(rows) - len(made)} of {len(rows)} scenes"
-        + (f". In the others time stepping, not an impact, creates energy: {words} of the energy exchanged"
+        + (f". Elsewhere time stepping, not an impact, creates energy: {words} of the energy exchanged"
            if made else ""), "all scenes", MIXED if made else REPRODUCED,
         miss=f"in {len(made)} of {len(rows)} scenes the stored energy at some instant exceeds its initial value plus "
              f"the work done, by an error of time stepping ({words} of the energy exchanged)" if made else "")
@@ -143,7 +143,7 @@ def _of_residuals(table: Table) -> Iterator[Part]:
     below = ", ".join(f"{row['scene']} ({row['order measured']:.2f})" for row in short)
     yield Part.of(
         "The residual of the energy balance is rounding, or falls as the step is shortened",
-        f"rounding in {len(rows) - len(tried)} scenes; with order {orders[0]:.2f} to {orders[-1]:.2f} "
+        f"rounding in {len(rows) - len(tried)} scenes; order {orders[0]:.2f} to {orders[-1]:.2f} "
         f"(median {float(np.median(orders)):.2f}) in {len(tried)} scenes" + (f"; too low: {below}" if short else ""),
         f"order of the integrator, {max(row['order declared'] for row in tried)}, or at most {ORDER_SLACK} less",
         MIXED if short else REPRODUCED)
