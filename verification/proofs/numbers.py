@@ -26,8 +26,8 @@ def unequal_restitution() -> tuple[Comparisons, Twins]:
     """The bar's energies from its velocities: before the impact (−1, 0), after it with J v⁺ = (1, 0)."""
     spin = 1 / (Fraction(1, 2) - Fraction(2, 5))
     after = (-Fraction(2, 5) * spin) ** 2 / 2 + spin**2 / 24
-    return (_is("the bar's energy after, from v⁺ = (−4, 10)", after, "=", "73/6"),
-            _is("is more than before", after, ">", "1/2")), ()
+    return (_is("the bar's energy after the impact, with v⁺ = (−4, 10)", after, "=", "73/6"),
+            _is("the bar's energy is larger than before the impact", after, ">", "1/2")), ()
 
 
 def erratum_rank() -> tuple[Comparisons, Twins]:
@@ -47,7 +47,7 @@ def erratum_spreading() -> tuple[Comparisons, Twins]:
             break
     return (_is("steps taken: m = 2 kg, v = −0.1 m/s, e = 1/2, 15 N, 512 Hz", steps, "=", 7),
             _is("velocity reached [m/s], instead of 0.05", speed, "<", "26/10000")), (
-                ("the numbers above", _is("velocity reached", speed, "=", "1/20"), ""),)
+                ("in numbers: the prescribed velocity", _is("velocity reached [m/s]", speed, "=", "1/20"), ""),)
 
 
 def erratum_saturation() -> tuple[Comparisons, Twins]:
@@ -59,12 +59,12 @@ def erratum_saturation() -> tuple[Comparisons, Twins]:
     def gained(force: Fraction, torque: Fraction) -> Fraction:
         return force * speed + force**2 / (2 * mass) + torque * spin + torque**2 / (2 * inertia)
 
-    return (_is("the full impulse takes energy [J]", gained(p, arm * p), "<", 0),
-            _is("the force is clipped [N s]", p, ">", "15/512"),
-            _is("the torque is not [N m s]", arm * p, "<", "1/512"),
-            _is("the clipped one adds energy [J]", gained(force, torque), ">", 0)), (
+    return (_is("energy gained with the full impulse [J]", gained(p, arm * p), "<", 0),
+            _is("the impulse exceeds the force limit [N s]", p, ">", "15/512"),
+            _is("its moment is below the torque limit [N m s]", arm * p, "<", "1/512"),
+            _is("energy gained with the clipped impulse [J]", gained(force, torque), ">", 0)), (
                 ("saturation is passive: the peg struck at its corner",
-                 _is("energy added by the clipped impulse [J]", gained(force, torque), "≤", 0), ""),)  # fmt: skip
+                 _is("energy gained with the clipped impulse [J]", gained(force, torque), "≤", 0), ""),)  # fmt: skip
 
 
 def spring_energy_after(*, implicit: bool) -> Fraction:
@@ -80,7 +80,7 @@ def resting_contact() -> tuple[Comparisons, Twins]:
     return (_is("KE⁺ + Φ⁺ of one mass, implicit force [J]", spring_energy_after(implicit=True), "≤", 4),), (
         ("the same with the explicit force, max(0, −K φ − B γ*)",
          _is("KE⁺ + Φ⁺ of one mass, explicit force [J]", spring_energy_after(implicit=False), "≤", 4),
-         "M = 1 kg at rest, K = 8 N/m, B = 0, φ = −1 m, h = 1 s: it leaves at 8 m/s, with 32 J instead of 4 J"),)
+         "M = 1 kg at rest, K = 8 N/m, B = 0, φ = −1 m, h = 1 s: 32 J after the step, 4 J before"),)
 
 
 def resting_energy() -> tuple[Comparisons, Twins]:
@@ -118,10 +118,10 @@ def fp_gram_pinv() -> tuple[Comparisons, Twins]:
         *(_is(f"energy after / before, k = {k}", energy_factor(k), "=", (1 + Fraction(2) ** (2 * k - 55)) ** 2)
           for k in (28, 32, 40, 52)),
         _is("k = 28: nine times the energy", energy_factor(28), "=", 9),
-        _is("with a cutoff of 1e-15: still a gain of a tenth", cut, ">", "11/10"),
-        _is("with a cutoff of 1e-12: a gain of 1e-4", energy_factor_above_cutoff(18100), ">", "10001/10000"),
-    ), (("the gain is bounded by 10⁶ for this conditioning", _is("k = 52", energy_factor(52), "≤", 10**6), ""),
-        ("a cutoff of 1e-15 makes it passive", _is("above the cutoff", cut, "≤", 1), ""))  # fmt: skip
+        _is("energy after / before, with a cutoff of 1e-15", cut, ">", "11/10"),
+        _is("energy after / before, with a cutoff of 1e-12", energy_factor_above_cutoff(18100), ">", "10001/10000"),
+    ), (("the energy grows at most by the factor 10⁶", _is("k = 52", energy_factor(52), "≤", 10**6), ""),
+        ("a cutoff of 1e-15 makes it passive", _is("energy after / before", cut, "≤", 1), ""))  # fmt: skip
 
 
 def random_case(draw: random.Random) -> Case:
@@ -155,7 +155,7 @@ def exact_instances() -> tuple[Comparisons, Twins]:
         _is("cases with redundant rows", redundant, ">", CASES // 2),
         _is("cases that satisfy the hypotheses", sum(all_hold(theorem.given, case) for case in cases), "=", CASES),
         _is("cases where all conclusions hold, python-flint", by_flint, "=", CASES),
-        _is("cases where all conclusions hold, sympy", both, "=", CASES // 4),
+        _is("cases where all conclusions hold, SymPy", both, "=", CASES // 4),
         _is("cases where the loss as printed in (24) holds (only those that lose nothing)", wrong, "<", CASES // 2),
     ), (("the printed loss holds in all cases", _is("cases", wrong, "=", CASES), ""),)
 
