@@ -26,14 +26,14 @@ _SLOW = ("subnormal velocities",)  # takes 2 ms an impact, the others some µs: 
 CERTIFIED_RUNS = "certified runs"  # the check that needs the runs of all other stages
 WITHOUT_IMPACTS = re.compile(r"-(PB|CBuc|ideal|ideal-friction)-[0-9a-f]+\.h5$")  # names of files that are not even read
 FEW = 100  # runs that are certified in this process, which is faster than to start others
-_RUNS = ("Impulse: the recorded generalized impulse; p: the recorded impulses at the contacts. Each of the last three "
-         "numbers is the largest relative error of an equation: M (v⁺ − v⁻) = impulse, Jᵀp = impulse, Jv⁺ = −e Jv⁻.")
-_NOTE = ("The impacts have up to 8 coordinates and contacts. A family is one kind of random impacts. “Light "
-         "directions”: velocities along the lightest directions of M; “600 decades”: masses and speeds of nearly all "
-         "sizes that doubles can represent. Moved: share of the impacts with v⁺ ≠ v⁻. Cancelled: v⁺ = "
-         "v⁻, because no velocity that the clamp (the last step, which corrects rounding) tried was free of gain. "
-         "Energy cost: the extra loss at e = 1 by the clamp, in units of 10 d ε √κ(M), the "
-         "most that rounding an exact v⁺ to doubles can change (d coordinates).")
+_RUNS = ("Gains: impacts that gain energy; the largest gain is relative to KE⁻. The three errors are relative, of M Δv "
+         "= impulse, Jᵀp = impulse and Jv⁺ = −e Jv⁻, with Δv = v⁺ − v⁻ and recorded impulses. –: does not apply.")
+_NOTE = ("A family is one kind of random impacts, with up to 8 coordinates and contacts. Light directions: v⁻ along "
+         "the lightest axis of M. 600 decades: masses and speeds of nearly all sizes of doubles. Moved: share of the "
+         "impacts with v⁺ ≠ v⁻. Cancelled: those in which the clamp shortened v⁺ − v⁻ to zero. Energy cost, at e = 1: "
+         "the energy lost, less that lost without clamp and refinement (the correction for the rounding of M's Cholesky "
+         "factor). It is relative to KE⁻, in units of 10 d ε √κ(M) for d coordinates. Rounding v⁺ to doubles changes "
+         "the energy by at most one unit. –: not computed.")
 
 
 def _certified(study: Study, name: str) -> list[Row]:
@@ -94,7 +94,7 @@ def _recorded_says(table: Table) -> Part:
 
 def _drawn_says(table: Table) -> Part:
     least = floor(1000.0 * min(table.column("moved"), default=0.0)) / 1000.0  # never rounded up
-    moved = f"at least {least:.1%} of the impacts of each kind changed the velocity"
+    moved = f"at least {least:.1%} of the impacts of each family changed the velocity"
     whole = f"{moved}, and so could have gained energy"
     return Part(f"{_adverse(table)}; {moved}", "", quantities=(("adverse impacts certified", f"{_sums(table)[1]:,}"),),
                 target="none", asked="Random impacts, drawn to provoke a gain, that gain energy",

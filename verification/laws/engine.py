@@ -34,7 +34,7 @@ def budgets(case: ImpactCase) -> range:
     return range(min(case.contacts, case.coordinates) + 1)
 
 
-@law(ENGINE_LAWS, "truncation", "an impact stopped after any number of rows is passive; without rows, no impulse",
+@law(ENGINE_LAWS, "truncation", "an impact stopped after any number of rows is passive; after no row, no impulse",
      partial(draw_case, largest_condition=1e12), resolve_impact)
 def every_budget_is_passive(case: ImpactCase, subject: Callable[..., Any]) -> Found:
     """Largest relative energy gain over all budgets; infinite if a budget of 0 rows still gives an impulse."""
@@ -246,8 +246,8 @@ def leak(case: HeldDevice, wall: Wall) -> float:
     return leaked(x, -np.array(force), case.device_damping, loop.dt)
 
 
-@law(ENGINE_LAWS, "hand_port", "the hand gets no energy from a sampled wall if b ≥ KT/2 + |B|",
-     draw_wall, penalty_wall)
+@law(ENGINE_LAWS, "hand_port",
+     "the hand gets no energy from a wall that meets Colgate's condition b ≥ KT/2 + |B|", draw_wall, penalty_wall)
 def hand_port_is_passive(case: HeldDevice, subject: Wall) -> Found:
     """Leak relative to the energy exchanged with wall and damper; the tolerance covers the rounding of n sums."""
     relative = leak(case, subject) / case.turnover if case.turnover > 0.0 else 0.0
@@ -292,8 +292,7 @@ def draw_held_device(rng: np.random.Generator) -> HeldDevice:
 
 
 @law(ENGINE_LAWS, "device_port",
-     "a hand that keeps pressing gets no energy from a device coupled to a tool on a rigid wall if b ≥ K_cpl T/2 + "
-     "B_cpl",
+     "the hand gets no energy from a coupler that meets Colgate's condition, if the tool is pressed on a rigid wall",
      draw_held_device, actuator_forces)
 def device_port_is_passive(case: HeldDevice, subject: Callable[[DeviceLoop, Floats], Floats]) -> Found:
     """Leak relative to the energy exchanged with coupler and damper.

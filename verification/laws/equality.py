@@ -84,7 +84,7 @@ def free_motion_is_kept(case: ImpactCase, resolver: Resolver, bounds: Bounds) ->
     return case.distance(moved, own_outcome(resolver, case) + z), bounds.comparison(case)
 
 
-@law(LAWS, "no_impulse", "e = −1 leaves v as it is")
+@law(LAWS, "no_impulse", "e = −1 does not change v")
 def minus_one_is_no_impulse(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """C09; the tolerance covers the rounding ε √κ(M) of the return from whitened coordinates."""
     v_plus = outcome(resolver, replace(case, restitution=-1.0))
@@ -216,7 +216,7 @@ def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds)
     return distance, 2.0 * bounds.comparison(together)
 
 
-@law(LAWS, "repeatability", "the same impact gives the same bits, whatever came before")
+@law(LAWS, "repeatability", "the same impact gives the same bits, whatever impacts came before")
 def same_input_same_output(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """0 if the bits agree after another impact was resolved in between, else 1."""
     first = own_outcome(resolver, case)

@@ -93,7 +93,7 @@ class ProofRecord:
             ("CONCLUSIONS", map(_formula, self.conclusions)),
             ("PROOF", (row for number, step in enumerate(self.steps, 1) for row in _step(number, step))),
             ("EACH HYPOTHESIS IS NEEDED", (row for case in self.needed for row in _refutation(case))),
-            ("WRONG TWINS", (row for twin in self.twins for row in _refutation(twin))),
+            ("FALSE VARIANTS", (row for twin in self.twins for row in _refutation(twin))),
             ("ASSUMED ABOUT ROUNDING", map(plain, self.assumed)),
             ("MEASURED ON THE COMPILED CODE", map(plain, self.measured)),
             ("REMARKS", map(plain, self.remarks)),
