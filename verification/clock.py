@@ -94,7 +94,7 @@ def limited(
     told, met = f"{what} {value:.3g}{unit}", value >= limit if least else value <= limit
     wanted, asked = f"at {'least' if least else 'most'} {limit:g}{unit}", f"{what[0].upper()}{what[1:]}"
     return Part(f"{asked} {value:.3g}{unit}{more}. Target: {wanted}.", REPRODUCED if met else MIXED, timed=timed,
-                miss="" if met else f"{told} (our target: {wanted.removesuffix(unit)})", quantities=quantities,
+                miss="" if met else f"{told} (our own target: {wanted.removesuffix(unit)})", quantities=quantities,
                 asked=asked, measured=f"{value:.3g}{unit}{more}", target=wanted)  # fmt: skip
 
 

@@ -93,9 +93,9 @@ def describe(pace: Pace) -> Iterator[str]:
         yield (f"{counted(pace.missed, 'deadline')} {_were(pace.missed)} missed ({share:.3g} %). No step was left out: "
                f"what came after was done that much later, and simulated time is {duration(pace.behind)} behind the "
                "clock.")
-    collisions, left_out = counted(pace.collisions, "collision"), pace.rows_left_out
+    collisions, left_out = counted(pace.collisions, "impact"), pace.rows_left_out
     if not pace.collisions:
-        yield "No collision was resolved by an impulse."
+        yield "No contact got an impulse."
     elif not left_out:
         yield f"{collisions}, each with all the rows it needed (the least budget was {pace.least_rows})."
     else:

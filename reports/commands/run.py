@@ -132,10 +132,10 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
     if len(impacts.step):
         lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
         most = max(int(block.max()) for block in blocks(impacts.rows))
-        yield (f"{counted(len(impacts.step), 'collision')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
+        yield (f"{counted(len(impacts.step), 'impact')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
               f"{counted(most, 'contact')} at once; {lost:.4g} J were lost in them.")
     else:
-        yield "No collision was resolved by an impulse."
+        yield "No contact got an impulse."
     if len(run.contacts.gap):
         yield f"Deepest penetration {deepest(run) * 1e3:.4g} mm."
     count, tool = len(run.coordinate_names), range(*run.tool_coordinates)

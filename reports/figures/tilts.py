@@ -55,8 +55,8 @@ def hero(tilted: Mapping[float, Mapping[str, Run]]) -> Drawn:
     rows = tuple((np.degrees(tilt), *(MILLI * each[ALL_THREE][name] for name in WORLDS),
                   *(_nearest(each[part]) for part in NAMED)) for tilt, each in found.items())  # fmt: skip
     columns = ("tilt [°]", *(f"{name} to ideal [mm]" for name in WORLDS), *map("nearest, {}".format, NAMED.values()))
-    numbers = titled(columns, rows, digits=3, note="Distances: root mean square of √(Δx² + Δy² + (50 mm Δθ)²); 50 mm: "
-                     "√(inertia / mass) of the peg, as the paper gives them.")
+    numbers = titled(columns, rows, digits=3, note="Distances: root mean square of √(Δx² + Δy² + (50 mm Δθ)²); 50 mm "
+                     "is √(inertia / mass) of the peg, by the paper's values.")
     said = "; ".join(f"{part} {_nearest(found[shown][part])}" for part in NAMED)
     panels = (
         Panel(canvas.svg.replace("</svg>", moves + "</svg>"), "A tilted peg moves to the lower right into a corner.",

@@ -41,7 +41,7 @@ OUTCOME_MARKS = dict(zip(OUTCOMES, "✓◐≈✕○…" + "✓✓◐≈✕○…
 OUTCOME_CLASSES = dict(zip(OUTCOMES, (
     "good", "where", "limited", "bad", "open", "absent", "good", "good", "where", "limited", "bad", "open", "absent",
     "limited", "open"), strict=True))  # fmt: skip
-FINDINGS = finding.IN_WORDS | {finding.MIXED: "mixed"}  # verdicts of a check that is not a claim of the paper, in words
+FINDINGS = finding.IN_WORDS | {finding.MIXED: "holds in part"}  # verdicts of a check that is not a claim of the paper, in words
 
 
 def draw_all(evidence: Evidence, recipes: Iterable[Recipe] = RECIPES, failures: list[Failure] | None = None
@@ -129,13 +129,13 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
     grid = grid.only(part in parts for part in grid["part"])
     if not grid.rows:
         return None
-    counts = [f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
-              for part in parts for shown in [grid.where(part=part)]]
+    each = ", ".join(f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
+                     for part in parts for shown in [grid.where(part=part)])
     caption = (
-        "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: with impulses (IAPB) the "
-        "hand's path is nearest to the path at a rigid wall (ideal). A cross: springs alone (PB) or a rigid wall felt "
-        "through a spring (CBuc) is nearer. A ring: the distances differ by less than the error of the ideal path. The "
-        f"map shows those starts of C10 that lie on a grid; of these, IAPB is closest in {', '.join(counts)}."
+        "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: the hand's path with "
+        "impulses (IAPB) is the nearest to the path at a rigid wall (ideal). A cross: the path with springs alone (PB) "
+        "or at a rigid wall felt through a spring (CBuc) is nearer. A ring cannot tell: the distances differ by less "
+        f"than the error of the ideal path. Of the starts on this grid that can tell, IAPB is nearest in {each}."
     )
     return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
                          "part", words=NAMED)
@@ -179,16 +179,16 @@ def judged(part: Part) -> str:
 def counted(part: Part) -> str:
     """Return as text in how many of the decided trials a part holds, how many cannot tell, and its region's counts."""
     if not part.decided and not part.unknown:
-        return ""
+        return "no trials"
     unknown = f" ({part.unknown} more cannot tell)" if part.unknown else ""
-    cases = f" ({part.cases} cases in these trials)" if part.cases else ""
+    cases = f" ({part.cases} cases in all)" if part.cases else ""
     if not (region := part.region):
         return f"{part.held} of {part.decided}{cases}{unknown}"
     share = f"; {region.share:.0%} of the tested range" if region.share else ""
-    both = (region.others, "others"), (region.fresh, "new ones")
+    both = (region.others, "other"), (region.fresh, "new")
     confirmed = " and ".join(f"{count} {which}" for count, which in both if count)
-    without = ", without new trials," if region.fresh else ""
-    return (f"(range chosen from {region.searched} trials, confirmed by {confirmed}{share}); over all "
+    without = " (new trials not counted)" if region.fresh else ""
+    return (f"(range chosen from {region.searched} trials, confirmed by {confirmed} trials{share}); over all "
             f"conditions{without} {part.held} of {part.decided}{cases}{unknown}")  # fmt: skip
 
 

@@ -18,11 +18,11 @@ from verification.cost.steps import hardest
 from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
-    "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv, where W† is the pseudo-inverse of W = J M⁻¹Jᵀ; (18) and (24) lack "
-    "the ½. The matrix in (37) is not W†, but what it should prove, (33), is true: redundant rows do not change "
-    "v⁺. (13) and (14) give each of two touching bodies an impulse of its own, so that momentum is not conserved. "
-    "The impulse (20) can pull, and computed as printed it can add energy by rounding. One more is in "
-    "docs/theory.md."
+    "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv, where W† is the pseudo-inverse of W = J M⁻¹Jᵀ; (18) and (24) lack the "
+    "½. The matrix in (37) is not W†, as the proof of (33) assumes; (33) is true: redundant rows do not change the "
+    "velocity after the impact. (13) and (14) give each of two touching bodies its own impulse, so that momentum is "
+    "not conserved. An impulse by (20) can pull. Computed as printed, (20) can add energy by rounding. One more error "
+    "is in docs/theory.md."
 )
 LIMIT = "Springs and time stepping can still add energy: see the known failures."
 # What the kinds of outcomes mean to somebody who has not read the ledger; "{s}" is the ending of the verb.
@@ -63,8 +63,8 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     counts = [f"{count} {words}" for count, words in count_claims(evidence.claims).values()]
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
-    told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials decide these "
-                 f"verdicts; {unknown:,} more cannot: the values are too close, or the effect does not occur.",
+    told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials (tested "
+                 f"conditions) decide this; {unknown:,} more cannot tell: values are too close, or an effect is absent.",
                  "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
@@ -94,7 +94,7 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
     table, limits = (each.tables.get(each.key) if each else None for each in (claim, limited))
     if table is None or "part" not in table.keys:
         return
-    found = {"with a device of unlimited force": table.where(part=LARGE)}
+    found = {"on a device without force limit": table.where(part=LARGE)}
     if limits is not None and "force_limit" in limits.keys:
         found["on the paper's device, limited to 15 N"] = limits.where(force_limit=1.0)
     ratios = {device: [row["IAPB"] / row["PB"] for row in rows.records()
@@ -103,8 +103,8 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
             for device, each in ratios.items() if each]  # fmt: skip
     if said:
         yield all(median(each) > 1.0 for each in ratios.values() if each), (
-            "As the paper claims, impulses push harder than springs alone: the largest force on the hand, in x "
-            "and in y, is "
+            "The paper says that impulses push harder than springs alone. Compared with springs alone, the largest "
+            "force on the hand with impulses, in x and in y, is "
             f"{', and '.join(said)}.")
 
 
@@ -113,18 +113,18 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     parts = [part for part in claim.parts if not part.role and part.decided] if claim else []
     if claim is None or not parts:
         return
-    each = ", ".join(f"{part.held} of {part.decided} in {part.named or part.name}" for part in parts)
+    each = ", ".join(f"{part.held} of {part.decided} starts for {part.named or part.name}" for part in parts)
     starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper says that impulses bring the hand's path nearer to that at a rigid wall than the other methods. "
-        f"Of {starts} starts, those with clearly different paths decide. This holds in {each}.")
+        "The paper says that the hand's path with impulses is nearer to the path at a rigid wall than with any other "
+        f"method. Of {starts} starts, only those with clearly different paths count. The claim holds in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
-        each = ", ".join(f"in {name} in {ahead} of {told}" for name, (ahead, told) in found.items())
+        each = " and ".join(f"{ahead} of {told} starts for {name}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the paper's peg is tilted by at most {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} "
-            f"starts), the path with impulses is nearest to that at a rigid wall {each} starts with clearly different "
-            "paths.")
+            f"If the peg is tilted by at most {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} starts), "
+            f"the hand's path with impulses is the nearest to the path at a rigid wall in {each}; starts with similar "
+            "paths do not count.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -132,12 +132,12 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
     if step := peg_step(evidence):
         yield f"A time step of the peg in the corner takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
-        ratios = sorted(float(row["ratio"]) for row in hardest(races))
-        yield (f"In {len(ratios)} scenes at rest or nearly so, our step is {1.0 / ratios[-1]:.2g} to "
-               f"{1.0 / ratios[0]:.2g} times as fast as MuJoCo's.")
+        ratios, wanted = (sorted(float(row[name]) for row in hardest(races)) for name in ("ratio", "target"))
+        yield (f"In {len(ratios)} scenes at rest or nearly so, our step takes {ratios[0]:.3g} to {ratios[-1]:.3g} times "
+               f"as long as MuJoCo's; our own targets are {wanted[0]:g} to {wanted[-1]:g}.")
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
-        yield (f"Lemke's complementarity method is faster than our engine at {raced.holds.count(False)} of "
-               f"{len(raced.decided)} sizes of impact at which the times clearly differ.")
+        yield (f"For {len(raced.decided)} sizes of an impact the times of Lemke's complementarity method and of our "
+               f"engine clearly differ; for {raced.holds.count(False)} of them Lemke's method is faster.")
 
 
 def _misses(topics: tuple[Finding, ...]) -> Fact:
@@ -145,7 +145,7 @@ def _misses(topics: tuple[Finding, ...]) -> Fact:
     lines = []
     for topic in sorted(topics, key=lambda topic: (*GRAVEST, topic.key).index(topic.key)):
         if clauses := [part.miss for part in topic.parts if part.miss]:
-            more = f" (and {len(clauses) - 1} more, page {topic.title})" if len(clauses) > 1 else ""
+            more = f" ({len(clauses) - 1} more on the page {topic.title})" if len(clauses) > 1 else ""
             lines.append((clauses[0][:1].upper() + clauses[0][1:] + more, topic.key))
     lacking = [topic.title for topic in topics if topic.answer and topic.verdict == NOT_COMPUTED]
     said = "" if lines or lacking else "Every finding of ours holds."

@@ -398,7 +398,7 @@ def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, m
 def test_live_says_how_it_kept_to_the_clock_and_what_it_stored_can_be_done_again(iapb, tmp_path, device):
     status, out, _ = iapb("live", "peg_corner", "--seconds", "0.1", "--set", "bodies.peg.velocity=[-0.3,0.4,0]",
                           "--out", tmp_path, *device)  # fmt: skip
-    for text in ("100 ticks at 1000 Hz", "A tick's work took", "It began late by", "deadline", "collision"):
+    for text in ("100 ticks at 1000 Hz", "A tick's work took", "It began late by", "deadline", "impact"):
         assert status == 0 and text in out, text
     timetable, path = sorted(tmp_path.glob("*.h5"), key=lambda path: "timetable" not in path.name)
     assert str(path) in out and str(timetable) in out

@@ -114,13 +114,13 @@ def test_a_miss_is_called_one(tables: Tables, change: Tables, number: str) -> No
     found = _found(tables | change)
     missed, others = ([part for part in found.parts if (part.verdict == MIXED) == miss] for miss in (True, False))
     assert len(missed) == 1 and number in missed[0].sentence and {part.verdict for part in others} == {REPRODUCED}
-    assert f"{len(others)} of {len(found.parts)} of our own targets of speed and accuracy are met" in found.answer
+    assert f"We meet {len(others)} of {len(found.parts)} of our own targets for speed and accuracy" in found.answer
     assert missed[0].miss or "a budget of rows" in missed[0].sentence  # the first page has a clause on it
 
 
 def test_a_scene_that_drifts_while_it_is_timed_is_not_called_at_rest() -> None:
     row = _races(0.4).by_title()[0]
-    for drift, said in ((1e-9, "corner at rest, a step"), (5e-3, "nearly at rest (moving by 0.005 rad), a step")):
+    for drift, said in ((1e-9, "corner at rest, our step"), (5e-3, "nearly at rest (moving by 0.005 rad), our step")):
         [part] = RACES.sentences(RACES.table_of([row | {"iapb's drift": drift}]))
         assert said in part.miss
 

@@ -191,7 +191,7 @@ C10 = peg_claim(
     quantity="RMS distance of the device trajectory from that of the ideal world, per coordinate, from the first "
     "contact until all four worlds have settled or the run ends. Beyond the paper: of all three together, "
     "√(x² + y² + (0.05 m θ)²). Fig. 7 shows the hand trajectory; whether it shows the rotation is not known. A contact "
-    "collides if it approaches faster than the approach velocity. At 1e-6 m/s every approaching contact collides, as "
+    "collides if it approaches faster than the collision threshold. At 1e-6 m/s every approaching contact collides, as "
     "in the paper; larger velocities are ours. No friction: the rigid worlds have none.",
     tolerance=f"IAPB's distance is the smallest of the three. {CANNOT_TELL}",
     rigid=True, further=FULL_GRID, fresh=MANY, row=_trajectory, holds=closest, says=_trajectory_says, parts=("part",),
@@ -451,7 +451,7 @@ def _settling_says(table: Table) -> str:
     smooth = table.where(part=SETTLES, friction=0.0).decided
     texts.append(f"without friction it settles sooner in {sum(smooth)} of {len(smooth)} runs")
     return ("The paper reports an experiment, which is not tested. The verdict is on a simulation of the pure mass of "
-            f"Section VI. At the paper's approach velocity the peg has {'; '.join(texts)}. A "
+            f"Section VI. At a collision threshold of {PAPERS:g} m/s the peg has {'; '.join(texts)}. A "
             "run that never settles counts as settling at its end.")
 
 

@@ -36,7 +36,7 @@ def complementarity(folders: Mapping[str, Path], worlds: Iterable[str] = ()) -> 
     """
     return Topic(
         key="complementarity", title="Against complementarity",
-        question="IAPB solves (21): every colliding contact separates with e times its approach velocity, and impulses "
+        question="IAPB solves (21): every colliding contact separates at e times its approach speed, and impulses "
         "may pull. A linear complementarity problem (LCP) allows only pushing impulses and decides which contacts "
         "push. Both laws are applied to the same impacts: random impacts of known geometry, every impact of the "
         "project's scenes, and problems that solvers find hard. A solution counts only if its residuals, recomputed "

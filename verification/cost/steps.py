@@ -103,7 +103,7 @@ def _races_say(races: Table) -> Iterator[Part]:
     for worst in hardest(races):
         moved = worst.get(_DRIFT) or 0.0
         rest = "at rest" if moved < STILL else f"nearly at rest (moving by {moved:.1g} rad)"
-        yield limited(f"with the {worst['scene']} {rest}, a step takes", worst["ratio"], worst["target"],
+        yield limited(f"with the {worst['scene']} {rest}, our step takes", worst["ratio"], worst["target"],
                       " times as long as MuJoCo's", " (MuJoCo: {MuJoCo's form}, {MuJoCo's contacts:.0f} contacts, "
                       "solver {MuJoCo's solver}; engine: {iapb's contacts:.0f} "
                       "contacts)".format_map(worst))  # fmt: skip

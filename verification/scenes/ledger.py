@@ -130,8 +130,8 @@ def _of_books(table: Table) -> Part:
         f"holds up to rounding in {len(rows) - len(made)} of {len(rows)} scenes"
         + (f". Elsewhere time stepping, not an impact, creates energy: {words} of the energy exchanged"
            if made else ""), "all scenes", MIXED if made else REPRODUCED,
-        miss=f"in {len(made)} of {len(rows)} scenes the stored energy at some instant exceeds its initial value plus "
-             f"the work done, by an error of time stepping ({words} of the energy exchanged)" if made else "")
+        miss=f"in {len(made)} of {len(rows)} scenes errors of time stepping create energy: the stored energy at some "
+             f"instant exceeds that at the start plus the work done ({words} of the energy exchanged)" if made else "")
 
 
 def _of_residuals(table: Table) -> Iterator[Part]:

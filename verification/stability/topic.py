@@ -79,13 +79,13 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
             f"{PAPER_DAMPING:g} N s/m")  # fmt: skip
     return Part(
         f"Of {theirs.size:,} walls ({theirs.size // len(groups)} pairs of stiffness and damping in {len(groups)} "
-        f"loops: rate, sensor, device damping), {ours.sum()} are stable with impulses and {theirs.sum()} without; "
-        f"the ratio is {min(more):.2f} to {max(more):.2f}, depending on the loop. {only}.",
+        f"loops of given rate, sensor and device damping), {ours.sum()} are stable with impulses and {theirs.sum()} "
+        f"without. With impulses, each loop has {min(more):.2f} to {max(more):.2f} times as many stable walls. {only}.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Stable walls with impulses, and without", target="more with impulses, and none lost",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
-        miss=f"of {theirs.size:,} walls {lost} are stable only without impulses ({there or 'none'} at the paper's "
-             f"damping), {int((ours & ~theirs).sum())} only with them"
+        miss=f"of {theirs.size:,} walls {lost} are stable only without impulses ({there or 'none'} of them at the "
+             f"paper's damping), and {int((ours & ~theirs).sum())} only with impulses"
         if lost else "")
 
 
