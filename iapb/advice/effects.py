@@ -250,7 +250,7 @@ EFFECTS: dict[str, Rule] = {
                      (laws.IMPULSES, laws.OWN_RESTITUTION), ignores="restitution"),
     "unequal_restitution": Rule(
         lambda q: f"pairs that can touch differ: {_by_pair(q, 'restitution')}",
-        "all contacts of a collision would bounce alike",
+        "all contacts of an impact would bounce alike",
         lambda q: "" if len(q.restitutions) > 1 else f"alike everywhere: {_by_pair(q, 'restitution')}",
         (laws.OWN_RESTITUTION,)),
     "impact_friction": Rule(

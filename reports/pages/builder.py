@@ -41,7 +41,7 @@ OUTCOME_MARKS = dict(zip(OUTCOMES, "✓◐≈✕○…" + "✓✓◐≈✕○…
 OUTCOME_CLASSES = dict(zip(OUTCOMES, (
     "good", "where", "limited", "bad", "open", "absent", "good", "good", "where", "limited", "bad", "open", "absent",
     "limited", "open"), strict=True))  # fmt: skip
-FINDINGS = finding.IN_WORDS | {finding.MIXED: "holds in part"}  # verdicts of a check that is not a claim of the paper, in words
+FINDINGS = finding.IN_WORDS | {finding.MIXED: "holds in part"}  # in words, for checks that are no claims
 
 
 def draw_all(evidence: Evidence, recipes: Iterable[Recipe] = RECIPES, failures: list[Failure] | None = None

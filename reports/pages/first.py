@@ -64,7 +64,7 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
     told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials (tested "
-                 f"conditions) decide this; {unknown:,} more cannot tell: values are too close, or an effect is absent.",
+                 f"conditions) decide this; {unknown:,} more cannot: values are too close, or an effect is absent.",
                  "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
@@ -122,9 +122,9 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = " and ".join(f"{ahead} of {told} starts for {name}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the peg is tilted by at most {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} starts), "
-            f"the hand's path with impulses is the nearest to the path at a rigid wall in {each}; starts with similar "
-            "paths do not count.")
+            f"If the peg is tilted by at most {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} "
+            f"starts), the hand's path with impulses is the nearest to the path at a rigid wall in {each}; starts with "
+            "similar paths do not count.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:

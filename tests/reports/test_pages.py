@@ -226,9 +226,9 @@ def test_each_page_lists_the_terms_that_it_uses_and_no_others(pages):
         listed = [readable(term) for found in lists for term in re.findall(r"<dt>(.*?)</dt>", found)]
         wanted = terms_of(readable(re.sub(r'<details class="numbers terms">.*?</details>', " ", page, flags=re.S)))
         assert wanted == terms_of(readable(page)) and listed == [TERMS[form][0] for form in wanted], name
-    hidden = '<head>CBuc</head><nav>patch</nav><script>"PB"</script><style>IAPB</style><p title="rank">impact</p>'
+    hidden = '<head>CBuc</head><nav>patch</nav><script>"PB"</script><style>IAPB</style><p title="rank">energy</p>'
     assert terms_of(readable(hidden)) == () and explained(hidden + "<!-- terms -->") == hidden
-    assert [TERMS[form][0] for form in terms_of("redundant contacts, IAPB-like, XPB")] == ["row", "redundant"]
+    assert [TERMS[form][0] for form in terms_of("rank of contacts, IAPB-like, XPB")] == ["row", "rank"]
 
 
 # The first page
@@ -248,7 +248,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     for text in ("holds where tilt ≤ 0.015 rad", "over all conditions 30 of 40</span>", "fails, as printed",
                  "fails (beyond the paper)", "Fails in a quantity<", "1 of 40 (7 more cannot tell)"):
         assert text in first, text
-    assert "125 trials decide these verdicts; 7 more" in page
+    assert "125 trials (tested conditions) decide this; 7 more" in page
     assert badge_words(topics[0]) == "1 of 2 findings fails" and badge_words(one("p", Part("a", REFUTED))) == "fails"
 
 
@@ -275,21 +275,22 @@ def test_the_answer_is_made_from_the_claims():
     x, turned = Part("s.", finding.WHERE, "x", 40, 40), Part("s.", REFUTED, "rotation", 1, 40, named="rotation")
     ours = Part("s.", REFUTED, "x, larger", 0, 9, role=finding.BEYOND)
     said = told(one("C10", x, turned, ours), forces, one("C14", tables={"C14": table}))
-    assert "8 times as large with a device of unlimited force (median of 3 values), and 3 times" in said["Holds"]
-    assert "This holds in 40 of 40 in x, 1 of 40 in rotation." in said["Fails"] and "of 9" not in said["Fails"]
-    assert "This holds in 40 of 40 in x." in told(one("C10", x, ours))["Holds"]
+    assert "8 times as large on a device without force limit (median of 3 values), and 3 times" in said["Holds"]
+    assert "in 40 of 40 starts for x, 1 of 40 starts for rotation." in said["Fails"] and "of 9" not in said["Fails"]
+    assert "The claim holds in 40 of 40 starts for x." in told(one("C10", x, ours))["Holds"]
 
 
 def test_the_first_page_maps_c10_and_small_tilts_hold_only_if_every_start_that_can_tell_does():
     found = c10("x")
     assert "does not settle within the run from 48 of 84 starts (tilts from 0.05 rad on)" in found.answer
     page = joined(Evidence(claims=(found,)))
-    assert "IAPB is closest in 24 of 84 in x" in page and 'id="where-c10"' in page
+    assert "IAPB is nearest in 24 of 84 in x" in page and 'id="where-c10"' in page
     fewer = replace(found, tables={"C10": found.tables["C10"].where(part="none")})
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
     for lost, label in ((0, "Holds"), (1, "Fails")):
         said = told(c10(("x", "y", ALL_THREE), lost))
-        assert "at most 0.86° (0.015 rad; 24 starts)" in said[label] and f"in x in {24 - lost} of 24" in said[label]
+        for text in ("at most 0.86° (0.015 rad; 24 starts)", f"in {24 - lost} of 24 starts for x"):
+            assert text in said[label]
 
 
 def test_the_first_screen_names_our_failures_the_gravest_first_and_what_was_not_computed():
@@ -303,7 +304,7 @@ def test_the_first_screen_names_our_failures_the_gravest_first_and_what_was_not_
     topics = (*(topic(key, MIXED, f"miss of {key}", "more") for key in given), topic("engines", MIXED))
     (fact,) = (fact for fact in facts(Evidence(topics=topics)) if fact.label == "Known failures")
     assert [id for _, id in fact.items] == [*given[:-3:-1], *given[3:0:-1], given[0]]  # engines: not our failure
-    assert fact.items[0] == ("Miss of exact-energy (and 1 more, page exact-energy)", "exact-energy")
+    assert fact.items[0] == ("Miss of exact-energy (1 more on the page exact-energy)", "exact-energy")
 
 
 # Quantities that several pages quote

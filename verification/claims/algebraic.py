@@ -464,9 +464,9 @@ def _without_impulse_says(table: Table) -> str:
     return (
         f"{sum(impacts.column('impacts'))} impacts with e = -1 change no velocity (largest change "
         f"{max(impacts.column('error')):.1g}). With e = -1 the engine switches impulses off, so its {len(once.rows)} "
-        f"trajectories are PB by construction: they have {made} collisions and differ from PB by at most "
+        f"trajectories are PB by construction: they have {made} impacts and differ from PB by at most "
         f"{max(exactly.column('error')):.1g}. Beyond the paper: if e is the next double "
-        f"above -1, the same starts have {sum(once.column('impacts'))} collisions. A step with a collision has no "
+        f"above -1, the same starts have {sum(once.column('impacts'))} impacts. A step with an impact has no "
         f"penalty force, so these trajectories differ from PB by up to {apart['x']:.2g} mm in x, {apart['y']:.2g} mm "
         f"in y and {apart['rotation']:.2g} mrad."
     )

@@ -154,7 +154,7 @@ def _rows_decide(five: Sequence[Row]) -> Part:
                       for name, values in after.items())
     apart = min(float(np.abs(a - b).max()) for a, b in combinations(after.values(), 2))
     return Part.of(
-        "Conservation laws do not determine the outcome; the choice of contacts that enter the collision does",
+        "Conservation laws do not determine the outcome; the choice of contacts that enter the impact does",
         f"velocities of five balls after the impact: {words} m/s. The paper uses the contacts that approach. Only "
         "solving the contacts one after the other passes the impulse to the last ball", "outcomes that differ",
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
