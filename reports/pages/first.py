@@ -19,7 +19,7 @@ from verification.finding import KINDS, NOT_COMPUTED, REPRODUCED, WHERE, Finding
 
 ERRATA = (
     "The energy loss is ½ (1 − e²) vᵀJᵀW†Jv, where W† is the pseudo-inverse of W = J M⁻¹Jᵀ; (18) and (24) lack the "
-    "½. The matrix in (37) is not W†, as the proof of (33) assumes; (33) is true: redundant rows do not change the "
+    "½. The matrix in (37) is not W†, so the proof of (33) fails. Yet (33) is true: redundant rows do not change the "
     "velocity after the impact. (13) and (14) give each of two touching bodies its own impulse, so that momentum is "
     "not conserved. An impulse by (20) can pull. Computed as printed, (20) can add energy by rounding. One more error "
     "is in docs/theory.md."
@@ -104,8 +104,7 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
     if said:
         yield all(median(each) > 1.0 for each in ratios.values() if each), (
             "The paper says that impulses push harder than springs alone. Compared with springs alone, the largest "
-            "force on the hand with impulses, in x and in y, is "
-            f"{', and '.join(said)}.")
+            f"force on the hand in x and in y is {', and '.join(said)}.")
 
 
 def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
@@ -123,8 +122,8 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
         each = " and ".join(f"{ahead} of {told} starts for {name}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
             f"If the peg is tilted by at most {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} "
-            f"starts), the hand's path with impulses is the nearest to the path at a rigid wall in {each}; starts with "
-            "similar paths do not count.")
+            f"starts), impulses bring the hand's path nearest to the path at a rigid wall in {each} (starts with "
+            "similar paths do not count).")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -133,11 +132,11 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
         yield f"A time step of the peg in the corner takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
         ratios, wanted = (sorted(float(row[name]) for row in hardest(races)) for name in ("ratio", "target"))
-        yield (f"In {len(ratios)} scenes at rest or nearly so, our step takes {ratios[0]:.3g} to {ratios[-1]:.3g} times "
-               f"as long as MuJoCo's; our own targets are {wanted[0]:g} to {wanted[-1]:g}.")
+        yield (f"In {len(ratios)} scenes at rest or nearly so, our step takes {ratios[0]:.3g} to {ratios[-1]:.3g} "
+               f"times as long as MuJoCo's; our own targets are {wanted[0]:g} to {wanted[-1]:g}.")
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
-        yield (f"For {len(raced.decided)} sizes of an impact the times of Lemke's complementarity method and of our "
-               f"engine clearly differ; for {raced.holds.count(False)} of them Lemke's method is faster.")
+        yield (f"Lemke's complementarity method is faster than our engine for {raced.holds.count(False)} of the "
+               f"{len(raced.decided)} sizes of impact whose times clearly differ.")
 
 
 def _misses(topics: tuple[Finding, ...]) -> Fact:
