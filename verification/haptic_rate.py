@@ -34,8 +34,8 @@ def _kernels_say(table: Table) -> Part:
     slower = table.that(False)
     sizes = {name: slower.where(problem=name)["contacts"] for name in dict.fromkeys(slower["problem"])}
     tried = {name: len(table.where(problem=name).rows) for name in sizes}
-    where = " and ".join(f"at {len(found)} of {tried[name]} sizes of a {name.split()[-1]} (contacts: "
-                         f"{' to '.join(map(str, sorted({min(found), max(found)})))})" for name, found in sizes.items())
+    where = " and ".join(f"at {len(found)} of {tried[name]} sizes of a {name.split()[-1]} (with "
+                         f"{', '.join(map(str, found))} contacts)" for name, found in sizes.items())
     return faster("both methods compiled", "Lemke's method", "sizes of impact", table.holds, where)
 
 
@@ -56,8 +56,7 @@ RATE = Check(
     cases=lambda study: list(_rates(study.table(C19))), timed=tuple(_MOST.values()),
     note="The largest tried number of contacts with which 999 of 1000 impacts end within 1 ms, on this machine.",
 )  # fmt: skip
-KERNELS = replace(C22, key="compiled, IAPB and Lemke", says=_kernels_say, note="Ratio: Lemke's time over IAPB's; a row "
-                  "holds if Lemke's method takes clearly longer.")
+KERNELS = replace(C22, key="compiled, IAPB and Lemke", says=_kernels_say)
 SOLVERS = replace(IMPACT_TIMES, key="solvers", says=solvers_say)
 # key of a check -> finding and table from which a report takes its rows
 QUOTED = {RATE.key: ("C19", "C19"), KERNELS.key: ("C22", "C22"), SOLVERS.key: ("complementarity", IMPACT_TIMES.key)}
@@ -66,8 +65,8 @@ BENCH = Topic(
     key="haptic-rate", title="The haptic rate",
     question="A haptic loop must finish each step within a millisecond. This page compares the engine's times with "
     "those of MuJoCo, Pinocchio, the printed formula and complementarity solvers. The programs are timed in turns "
-    "within one run, so that the load of the machine affects all alike. A step of ours "
-    "includes writing its record; one of MuJoCo does not.",
+    "within one run, so that the load of the machine affects all alike. The engine's step "
+    "includes recording the state; MuJoCo's step does not.",
     checks=(RACES, SCALING, KERNELS, SOLVERS, FITTED, RATE, BODIES, ROBOTS, MOTIONS, WORTH, BUDGET_ROWS),
     says=_answer,
 )  # fmt: skip

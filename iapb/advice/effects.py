@@ -214,7 +214,7 @@ EFFECTS: dict[str, Rule] = {
     "gravity": Rule(lambda q: f"gravity is on: gravity = {numbers(q.scene.gravity)} m/s2",
                     lambda q: f"{', '.join(q.sinking) or 'bodies'} would not fall or sag", _weightless),
     "varying_inertia": Rule(
-        lambda q: f"the mass matrix depends on the configuration: {q.turning} carries mass off its axis or other links",
+        lambda q: f"the mass matrix depends on the configuration: {q.turning} can turn links or mass off the axis",
         "links would keep the inertia of their first pose",
         lambda q: "the mass matrix is constant: it is factored once, before the first step"
         if q.mechanism.has_constant_mass_matrix else ""),
@@ -251,7 +251,7 @@ EFFECTS: dict[str, Rule] = {
     "unequal_restitution": Rule(
         lambda q: f"pairs that can touch differ: {_by_pair(q, 'restitution')}",
         "all contacts of an impact would bounce alike",
-        lambda q: "" if len(q.restitutions) > 1 else f"alike everywhere: {_by_pair(q, 'restitution')}",
+        lambda q: "" if len(q.restitutions) > 1 else f"all contacts are alike: {_by_pair(q, 'restitution')}",
         (laws.OWN_RESTITUTION,)),
     "impact_friction": Rule(
         lambda q: _by_pair(q, "friction"), "bodies would bounce without losing tangential speed",
@@ -261,7 +261,7 @@ EFFECTS: dict[str, Rule] = {
     # resting contacts: K and B of (5), friction by Coulomb's law or by (6)
     "penalty_stiffness": _contact(
         "stiffness", "N/m", laws.PENALTY, "nothing would hold a body that rests on another",
-        lambda q: (", implicit" if q.scene.contact.forces == "implicit" else ", explicit (5)")
+        lambda q: (", implicit" if q.scene.contact.forces == "implicit" else ", explicit, equation (5)")
         + ": chosen for small sags" * ("stiffness" in q.scene.contact.chosen), "stiffness"),
     "contact_damping": _contact(
         "damping", "N s/m", laws.PENALTY, "resting contacts would swing on their springs",
@@ -285,7 +285,7 @@ EFFECTS: dict[str, Rule] = {
         else "the rendering 'full' ignores the limits" if q.rendering == "full" else "",
         absent=lambda q: "" if q.rendering in ("scale", "spread") else q.no_device()),  # they scale the tool's impulse
     "delay": Rule(lambda q: f"device.delay = {q.device.delay} steps, {1e3 * q.device.delay * q.scene.step:g} ms",
-                  "the coupling would look more stable than over a real line",
+                  "the coupling would look more stable than with a real delay",
                   lambda q: "" if q.device.delay else "device.delay = 0", absent=Question.no_device),
     "quantisation": _device("position_resolution", "m, rad",
                             "the coupling would be fed exact positions and velocities"),

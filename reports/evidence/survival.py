@@ -12,7 +12,7 @@ from reports.runner import Runner
 from verification.finding import REFUTED, REPRODUCED, Failure, Finding, Part, finding_of, of_each
 from verification.table import titled
 
-LEAD = "Do runs come out the same to the last bit when they are simulated again from their files alone?"
+LEAD = "Does a run repeat to the last bit if it is simulated again from its file alone?"
 
 
 def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) -> Finding:
@@ -23,7 +23,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     part = Part(f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated again from "
                 "their own files alone.", REPRODUCED if same == len(repeated) else REFUTED, target="all",
                 asked="Runs of the figures that repeat to the last bit", measured=f"{same} of {len(repeated)}")
-    table = titled(("run", "content hash stored", "simulated again", "differs in"), [
+    table = titled(("run", "content hash stored", "content hash, simulated again", "differs in"), [
         (name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
         for name, one in repeated])  # fmt: skip
     tables = {"simulated again": table}

@@ -90,9 +90,8 @@ def where_iapb_loses(kernels: Table, numbers: Table) -> Drawn:
     panels = [Panel(plot.svg, alt.strip()), Panel(*_lost_on_hard_impacts(numbers), "hard impacts", wide=True)]
     faster = [str(row["contacts"]) for row in _times_of_daqp(numbers, accuracy.IAPB) if row["ratio"] < 1.0]
     return Drawn(panels, kernels, {**looks, called.name: called}, {
-        "families": said.strip(), "python": f"With {' and '.join(faster)} contacts it is faster even than compiled "
-                                            "IAPB." if
-        faster else "Compiled IAPB is faster than DAQP from Python at every size."})  # fmt: skip
+        "families": said.strip(), "python": f"With {' and '.join(faster)} contacts DAQP from Python is faster even "
+        "than compiled IAPB (median)." if faster else "DAQP from Python is slower than compiled IAPB at every size."})
 
 
 def _times_of_daqp(numbers: Table, ours_by: str = accuracy.CALLED) -> Iterator[Row]:
@@ -107,31 +106,31 @@ def _times_of_daqp(numbers: Table, ours_by: str = accuracy.CALLED) -> Iterator[R
 
 
 def _lost_on(name: str, kernels: Table) -> str:
-    """Say for which contact counts of one family IAPB clearly costs more, and by which factor at worst."""
+    """Say for how many sizes of one family IAPB clearly costs more, and by which factor at worst."""
     slower = [row for row in kernels.records() if costs_more(row) is False]
     where = f"On the {name.split()[-1]}"
     if not slower:
         return f"{where} IAPB is never clearly slower. "
     worst = 1.0 / min(row["ratio"] for row in slower)
-    return f"{where} IAPB is clearly slower at {len(slower)} of {len(kernels.rows)} sizes, up to {worst:.2g} times. "
+    return f"{where} Lemke is clearly faster at {len(slower)} of {len(kernels.rows)} sizes (up to {worst:.2g} times). "
 
 
 def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
     """Return a table of the fastest rival by number of contacts, compiled and called from Python, and its text."""
-    heads = {accuracy.COMPILED: "fastest compiled method", accuracy.PYTHON: "fastest method from Python"}
+    heads = {accuracy.COMPILED: "fastest compiled solver", accuracy.PYTHON: "fastest solver from Python"}
     lines: dict[str, list[str]] = {}
     for called in heads:
         lost = accuracy.lost_to_rivals(numbers, called)
         for c in dict.fromkeys(numbers.column("contacts")):
             here, cases = lost.where(contacts=c), set(numbers.where(called=called, contacts=c).column("problem"))
             best = max(here.records(), key=lambda row: float(row["ratio"]), default=None)
-            told = "IAPB" if best is None else (
-                f"{best['solver']}: up to {best['ratio']:.2g} times faster, on {len(set(here.column('problem')))} of "
-                f"{len(cases)} impacts")
+            told = "none: IAPB is the fastest" if best is None else (
+                f"{best['solver']}: up to {best['ratio']:.2g} times as fast; IAPB loses on "
+                f"{len(set(here.column('problem')))} of {len(cases)} impacts")
             lines.setdefault(_contacts({"contacts": c}), []).append(told)
     words = "; ".join(f"{size}: " + ", ".join(map("{}: {}".format, heads.values(), said))
                       for size, said in lines.items())  # fmt: skip
-    titles = tuple(f"{head}, relative to IAPB" for head in heads.values())
+    titles = tuple(f"{head}, compared with IAPB" for head in heads.values())
     return grid(titles, {size: [*map(cell, said)] for size, said in lines.items()}, "plain"), words
 
 
@@ -183,9 +182,9 @@ _WORLDS = {motion.IMPULSES: STYLES["IAPB, Euler"], motion.STIFFENED: STYLES["PB,
            IDEAL: STYLES["ideal, Python"], **_ENGINES}  # fmt: skip
 _INTEGRATORS = {method: STYLES[name] for method, name in motion.SHORT.items()}
 _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
-_HEADINGS = ("called", "a tenth of the error takes (scenes with a fit)", "smallest error, median of the scenes",
-             "best for its time (grey), at errors", "energy made, relative to the kinetic energy")
-_NEVER = "never worth its time here"
+_HEADINGS = ("called", "time for a tenth of the error: median, range (scenes with a fit)", "smallest error, median",
+             "best for its time (grey): scenes, errors", "largest energy gain, relative to the kinetic energy")
+_NEVER = "in no scene"
 _FAST = 100.0  # [ms per simulated second] ten times as fast as the motion
 _PALE = 0.45  # strength of marks that are not used
 
@@ -209,7 +208,7 @@ def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle], most: i
         lost = motions.only(outcome != "ok" for outcome in motions.column("outcome")).where(scene=scene)
         panels.append(Panel(_motions(f"{key}-{number}", here, lost, looks),
                             f"{scene}: error of position against computing time. {said}.",
-                            f"{scene}. Smallest error {_nearest(here, looks)}"))
+                            f"{scene}. Smallest error{_nearest(here, looks)}"))
     return Drawn(panels, worth, {look.name: look for look in looks.values()} | {"best for its time": _FRONT})
 
 
@@ -223,9 +222,9 @@ def _nearest(here: Sequence[motion.Curve], looks: Mapping[str, LineStyle]) -> st
     runs = [(run["position"], run["time"], looks[curve.method].name)
             for curve in here for run in curve.runs if not motion.by_chance(run)]
     fast, best = min((run for run in runs if run[1] <= _FAST), default=None), min(runs)
-    at_once = (f"with {_FAST:g} ms of computing per simulated second: {fast[2]}, {power_of_error(fast[0])}; "
-               if fast and fast != best else "")  # fmt: skip
-    return f"{at_once}with any time: {best[2]}, {power_of_error(best[0])}"
+    at_once = (f" with at most {_FAST:g} ms of computing per simulated second: {power_of_error(fast[0])} ({fast[2]}); "
+               "without this limit" if fast and fast != best else "")  # fmt: skip
+    return f"{at_once}: {power_of_error(best[0])} ({best[2]})"
 
 
 def _worth_said(row: Row, step: float) -> tuple[str, ...]:
@@ -242,7 +241,7 @@ def _worth_said(row: Row, step: float) -> tuple[str, ...]:
         best = f"{row['best for its time']} of {scenes} scenes, {' to '.join(errors)}"
     made = "none"
     if row["energy made"] > accuracy.NO_GAIN:
-        made = f"up to {100 * row['energy made']:.2g} %, step {step:g} ms"
+        made = f"{100 * row['energy made']:.2g} %, at a step of {step:g} ms"
     return row["called"], cost, power_of_error(row["least error"]), best, made
 
 
@@ -278,8 +277,8 @@ def anytime(numbers: Table) -> Drawn:
         sizes.setdefault(f"{row['contacts']} contacts", []).append(row)
     looks, panels, ranges = looks_of(sizes), [], {}
     for key, name, alt, label in (
-        ("velocity", "velocity left [%]", "Velocity left against the share of rows done.",
-         "normal velocity left, share of that before"),
+        ("velocity", "residual left [%]", "Residual left against the share of rows done.",
+         "largest residual after the impact, relative to that before it"),
         ("energy", "energy loss missing [%]", "Missing loss against the share of rows done.",
          "missing part of the energy that the complete impact takes"),
     ):  # fmt: skip

@@ -102,7 +102,7 @@ def _found(tables: Tables) -> Finding:
     [
         ({RACES.key: _races(0.4)}, "0.4 times as long as MuJoCo's"),
         ({SCALING.key: _times(5.0)}, "takes 5 times"),
-        ({SOLVERS.key: _costs((IAPB, 1e-4), ("daqp", 3e-5), (DAQP, 2e-4))}, "on a patch of 4 contacts than daqp"),
+        ({SOLVERS.key: _costs((IAPB, 1e-4), ("daqp", 3e-5), (DAQP, 2e-4))}, "than daqp on a patch of 4 contacts"),
         ({SOLVERS.key: _costs((IAPB, 1e-4), ("daqp", 3e-4), (DAQP, 3e-5))}, "faster than DAQP in 0 of the 1 impacts"),
         ({KERNELS.key: _kernels(2.0, 0.5, 1.0)}, "faster than Lemke's method in 1 of the 2 sizes of impact"),
         ({BODIES.key: _bodies(20, 200, step=lambda n: 1e-3 * n**2, tested=int)}, "power 2"),

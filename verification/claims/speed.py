@@ -140,5 +140,6 @@ C22 = Check(
     "12 %, once by 19 %: a verdict near the limit can change.",
     cases=lambda study: [Impact(problem, contacts) for contacts in SIZES for problem in PROBLEMS],
     row=_ratio, holds=costs_more, says=_ratio_says, parts=["problem"], conditions=["contacts"],
-    timed=TIMES, timed_rows=True, axes=("contacts", "decades", "problem"),
+    timed=TIMES, timed_rows=True, axes=("contacts", "decades", "problem"), note="Ratio: Lemke's time over IAPB's. A "
+    "row holds if the lower quartile is at least 1.1, and fails if the upper quartile is at most 1/1.1.",
 )  # fmt: skip

@@ -173,8 +173,8 @@ MEASURED = ("time [µs]", "quartiles [µs]", "relative error", "relative energy 
 ACCURACY = Check(
     key="accuracy", question="How exact is an impact in the time that it takes?", cases=lambda _: _hard(SIZES),
     row=partial(_measured, WAYS, ROUNDS), timed=MEASURED, timed_rows=True, digits=3,
-    note="Median CPU times of the thread; methods run in random order, with a warm-up call before each. Errors are "
-    "distances from the exact v⁺ (fractions) over |v⁻|, in the kinetic metric. A loss of energy counts as no gain.",
+    note="Times are medians of the thread's CPU time; methods run in random order, each after a warm-up call. "
+    "Relative error: the distance of v⁺ from the exact v⁺ over |v⁻| (kinetic metric). Energy gain: 0 for a loss.",
 )  # fmt: skip
 
 
@@ -309,9 +309,9 @@ def choices(measured: Table) -> Table:
             row["nearest"] = f"{best.method}, {best.work}: {best.largest:.1g}"
         rows.append(row)
     return table_from(rows, digits=2, timed=CHOSEN[3:], note=(
-        f"The best compiled method; the last column is the best of those called from Python. None: no method solves "
-        f"half of the nine impacts to {SOLVED:g} in time; then “nearest” is the best that ends in time, with its "
-        "largest error."))  # fmt: skip
+        f"The compiled method, and the method called from Python, that solve most of the nine impacts to {SOLVED:g} in "
+        "time; ties go to the smaller largest error. Time and error are medians. None: no method solves half of the "
+        "impacts; “nearest” is then the method that answers most impacts in time, with its largest error."))
 
 
 def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:
@@ -369,7 +369,7 @@ def _budgets_say(table: Table) -> Part:
     half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
     return target(
         "An impact that stops early, after a budget of rows (energy computed exactly)",
-        f"adds energy in {gains} of {len(rows)} combinations of size and budget. Half of the rows take "
+        f"adds energy in {gains} of {len(rows)} combinations of size and budget. With half of the rows it takes "
         f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "never adds energy",
         gains == 0, timed=False)  # fmt: skip
 
@@ -377,5 +377,6 @@ def _budgets_say(table: Table) -> Part:
 BUDGET_ROWS = Check(
     key="budgets", question="What does an impact give that stops early?", row=stopped, says=_budgets_say, digits=3,
     cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
-    note="Residual: max |Jᵢ v⁺ + e Jᵢ v⁻| / √(Jᵢ M⁻¹ Jᵢᵀ), relative to |v⁻| in the kinetic metric.",
+    note="Residual: max |Jᵢ v⁺ + e Jᵢ v⁻| / √(Jᵢ M⁻¹ Jᵢᵀ) over the contacts i, relative to |v⁻| in the kinetic "
+    "metric. Share of the loss: the energy lost, relative to the complete impact (median). A negative gain is a loss.",
 )  # fmt: skip

@@ -166,8 +166,8 @@ def summary(effects: Mapping[str, Table]) -> Table:
 
     return table_from((row for given in effects.items() for row in rows(*given)), digits=3,
                       timed=("time saved", "best of its error"),
-                      note="Best of its error: no other effect saves more time without a larger error. "
-                      f"A time saved of 0: {_BELOW}.")
+                      note="Best of its error: leaving out any other effect saves less time or makes a larger "
+                      f"error. Time saved 0: {_BELOW}.")
 
 
 def steps(effects: Mapping[str, Table]) -> Table:
@@ -186,8 +186,9 @@ def steps(effects: Mapping[str, Table]) -> Table:
 
     return table_from((row(*given) for given in effects.items()), digits=3, prose=("shares of the step",),
                       timed=("step", "all on", "faster than real time", "shares of the step"),
-                      note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect. "
-                      f"Effects that are not named are {_BELOW} or cannot be left out. Shares need not add up.")
+                      note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect, "
+                      "also because the motion changes; so shares need not add up to 100 %. Effects that are not named "
+                      f"are {_BELOW} or cannot be left out.")
 
 
 def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
@@ -195,9 +196,9 @@ def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
     kinetic, share = whole.kinetic(), saved(ratio)
     place, device = _farthest(whole.places(), other.places()), _farthest(whole.device_places(), other.device_places())
     energy = 100.0 * float(np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), np.finfo(float).tiny))
-    moved = f"motion differs by up to {_length(place or 0.0)}"
-    moved += f", that of the device by {_length(device)}" if device is not None else ""
-    change = f"{moved}; kinetic energy differs by up to {energy:.3g} % of its largest value"
+    moved = f"position changes by up to {_length(place or 0.0)}"
+    moved += f", the device's by {_length(device)}" if device is not None else ""
+    change = f"{moved}; kinetic energy changes by up to {energy:.3g} % of its largest value"
     if whole.same_motion(other):
         kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
         touching = whole.touching()

@@ -63,7 +63,7 @@ def printed_over_factored(table: Table) -> Iterator[tuple[int, float, float, flo
 def _scaling_says(table: Table) -> Iterator[Part]:
     for contacts, ours, _, ratio in printed_over_factored(table):
         yield limited(f"with 12 coordinates and {contacts} contacts of rank 8 the printed formula takes", ratio,
-                      FACTORS[contacts], " times the time of the engine's (factored) impact", f" of {ours:.3g} µs",
+                      FACTORS[contacts], " times as long as the engine's factored impact", f" ({ours:.3g} µs)",
                       least=True)  # fmt: skip
 
 

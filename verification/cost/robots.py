@@ -66,7 +66,7 @@ def _robots_say(table: Table) -> Iterator[Part]:
         worst = max(rows, key=lambda row: float(row["ratio"]))
         count = len({row["robot"] for row in rows})
         yield limited(f"the {_WORDS[worst['quantity']]} of the robot {worst['robot']}, {form}, takes", worst["ratio"],
-                      limit, " times as long as Pinocchio's", f" (the largest ratio of {count} {table.note})")
+                      limit, " times as long as Pinocchio's", f" (the largest over M and B of {count} {table.note})")
 
 
 ROBOTS = Check(

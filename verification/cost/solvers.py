@@ -107,7 +107,7 @@ def solvers_say(table: Table) -> tuple[Part, Part]:
         for (solver, family), found in lost.items():
             ends = " to ".join(map(str, sorted({min(found), max(found)})))
             groups.setdefault(f"on a {family} of {ends} contacts", []).append(solver)
-        where = "; ".join(size + f" than {', '.join(names)}" * (len(solvers) > 1) for size, names in groups.items())
+        where = "; ".join(f"than {', '.join(names)} " * (len(solvers) > 1) + size for size, names in groups.items())
         return faster(how, rival, what, [more for _, more in pairs], where)
 
     common = part("both methods called from Python (the solvers through a common interface)",
@@ -137,7 +137,7 @@ def faster(how: str, rival: str, what: str, outcomes: Sequence[bool | None], whe
     return target(
         f"Time of one impact, from M, J and v to v⁺ at the same accuracy; {how}",
         f"IAPB is faster than {rival} in {count - slower} of the {count} {what} whose times differ clearly"
-        f"{f' (in {more} more they do not)' * bool(more)}{where and f'. IAPB is slower {where}'}",
+        f"{f' ({more} more are undecided)' * bool(more)}{where and f'. IAPB is slower {where}'}",
         "IAPB is faster in all", not slower,
         f"with {how}, IAPB is slower than {rival} in {slower} of {count} {what}")
 
@@ -147,8 +147,8 @@ MEASURED = ("median [µs]", "least [µs]", "largest [µs]")
 IMPACT_TIMES = Check(
     key="time per impact", question="", row=time_impact, timed=(*MEASURED, "note"), digits=3,
     cases=lambda _: [Size(family, contacts) for contacts in CONTACTS for family in FAMILIES],
-    note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. The two kernels are called "
-    "from compiled code, all others from Python. The common interface of the solvers checks arguments and results and "
-    "forms W: compare “direct call”, DAQP without this interface. "
-    "Distance of v⁺: from IAPB's for our two and the printed formula, from DAQP's for the complementarity solvers.",
+    note="Time from M, J and v to v⁺ on one thread; methods are timed in turns. The two kernels are called from "
+    "compiled code, all others from Python. The common interface of the solvers checks arguments and results and "
+    "forms W; “daqp, direct call” does without it. Distance: of v⁺ from that of IAPB (rows of IAPB and the printed "
+    f"formula) or of DAQP (complementarity solvers), over |v⁻|; above {_SOLVED:g} the outcome is “failed”.",
 )  # fmt: skip

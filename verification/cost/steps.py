@@ -104,8 +104,8 @@ def _races_say(races: Table) -> Iterator[Part]:
         moved = worst.get(_DRIFT) or 0.0
         rest = "at rest" if moved < STILL else f"nearly at rest (moving by {moved:.1g} rad)"
         yield limited(f"with the {worst['scene']} {rest}, our step takes", worst["ratio"], worst["target"],
-                      " times as long as MuJoCo's", " (MuJoCo: {MuJoCo's form}, {MuJoCo's contacts:.0f} contacts, "
-                      "solver {MuJoCo's solver}; engine: {iapb's contacts:.0f} "
+                      " times as long as MuJoCo's", " (MuJoCo: solver {MuJoCo's solver}, shape {MuJoCo's form}, "
+                      "{MuJoCo's contacts:.0f} contacts; engine: {iapb's contacts:.0f} "
                       "contacts)".format_map(worst))  # fmt: skip
 
 
@@ -160,10 +160,10 @@ RACES = Check(
     key="steps against MuJoCo", question="How long is a step, compared with MuJoCo's?", row=race, says=_races_say,
     cases=lambda _: RESTING if find_spec("mujoco") else (), digits=3,
     timed=("MuJoCo's step", "ratio", "quartiles", "iapb's drift", "MuJoCo's drift"),
-    note="Frictionless (condim 1), with the same masses, forces and step (peg: 1/512 s, others 1 ms). MuJoCo runs with "
-    "each of its solvers, otherwise with its defaults; the findings name its fastest solver. Our step includes writing "
-    "its record. Ratio: our time over MuJoCo's, median of the rounds. Contacts: means over the timed steps. Drift: the "
-    "largest change of a coordinate while timed [m, rad].",
+    note="Both engines simulate the same masses, forces and time step (peg: 1/512 s, others 1 ms) without friction. "
+    "MuJoCo runs with each of its solvers, otherwise with its defaults; the findings name its fastest solver. Ratio: "
+    "time of iapb's step, which includes its recording, over that of MuJoCo's step; median of the rounds. Contacts: "
+    "means over the timed steps. Drift: the largest change of a coordinate during the timed steps [m, rad].",
 )  # fmt: skip
 
 
@@ -230,9 +230,9 @@ def _bodies_say(table: Table) -> Iterator[Part]:
                   "power", power,
                   LARGEST_POWER, "", more, quantities=(("exponent of bodies", f"{power:.3g}"),))  # fmt: skip
     last = rows[-1]
-    yield limited("the tested pairs of shapes grow as the number of bodies to the power", power_law(bodies, pairs),
-                  LARGEST_POWER, "", f" ({last['pairs tested']:.0f} of {last['pairs of shapes']:,} pairs are tested "
-                  f"for {last['bodies']} free bodies)", timed=False)  # fmt: skip
+    yield limited("the number of tested pairs of shapes grows as the number of bodies to the power",
+                  power_law(bodies, pairs), LARGEST_POWER, "", f" ({last['pairs tested']:.0f} of "
+                  f"{last['pairs of shapes']:,} pairs for {last['bodies']} free bodies)", timed=False)  # fmt: skip
 
 
 BODIES = Check(

@@ -433,7 +433,7 @@ def _motions_say(motions: Table) -> Iterator[Part]:
         more = f". IAPB reaches MuJoCo's error in {_took(as_good)}" if as_good < inf else ""
         yield target(f"Whole motion ({scene}): the smallest position error that any tried time step reaches, in % of "
                      "the body's length (and the computing time per simulated second)", f"{text}{more}",
-                     "IAPB has the smallest error, and reaches MuJoCo's in less time", exact and fast,
+                     "IAPB has the smallest error, and reaches MuJoCo's error in less time than MuJoCo", exact and fast,
                      f"in the whole motion “{scene}” " + (
                          "another method is as exact in less time" if exact else
                          f"no time step makes IAPB as exact as {most} (smallest errors {_error(ours)} and "
@@ -451,22 +451,21 @@ def _error(run: Row) -> str:
 MOTIONS = Check(
     key="motions", question="What does the accuracy of a whole motion cost?", cases=lambda _: TRAJECTORY_SCENES,
     row=motions_of, says=_motions_say, timed=("time", "outcome", "note"), digits=3,
-    note="The truth is an event-driven solution with rigid walls. Under the constant push in the corner the springs of "
-    "IAPB and PB yield, and no time step removes this error. Position: the largest distance from the truth, sampled "
-    "every millisecond, over the body's length. Energy error: that at the end, as size and as simulated minus true; "
-    "energy made: the largest rise above the start; both relative to the largest kinetic energy. Time: of computing a "
-    "simulated second. An error smaller than the "
-    "uncertainty of the truth is replaced by that uncertainty.",
+    note="The truth is an event-driven solution with rigid walls. In the corner a constant force compresses the "
+    "springs of IAPB and PB, and no time step removes the error that this causes. Time: computing time per simulated "
+    "second. Position error: the largest distance from the truth, sampled every millisecond. Energy error: the error "
+    "at the end, as size and with its sign. Energy made: the largest rise above the energy at the start. Energies are "
+    "relative to the largest kinetic energy. An error below the error bound of the truth is replaced by this bound.",
 )  # fmt: skip
 WORTH = Check(
     key="worth", question="Which method is worth its time?", row=lambda _, row: row, digits=2,
     cases=lambda study: worth(study.table(MOTIONS), WORLDS).by_title(), timed=(
         "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
-    note="Errors are those of position; the smallest error is a median over the scenes. Cost: the "
-    "factor in computing time for a tenth of the error, fitted to those consecutive time steps between which the error "
-    f"falls by a factor of at least {GAINED:g}. A fit needs {FIT_RUNS} runs and a total fall by a factor of "
-    f"{FIT_FALL:g}, and is never extrapolated. Best for its time: number of scenes with a run (error up to "
-    f"{USEFUL:g} lengths) that no other run beats in both time and error. Energy made: the largest rise above the "
-    "energy at the start.",
+    note="Errors are position errors in body lengths. The factor in time for a tenth of the error is a median over "
+    "the scenes; least and largest cost are its range. It is fitted to consecutive time steps between which the error "
+    f"falls by a factor of at least {GAINED:g}; a fit needs {FIT_RUNS} runs and a total fall by a factor of "
+    f"{FIT_FALL:g}. Best for its time: scenes with a run (error up to {USEFUL:g}) such that no other run is both "
+    "faster and more accurate. Energy made: the largest rise above the energy at the start, relative to the largest "
+    "kinetic energy. Failed: also runs that are too slow.",
 )  # fmt: skip
