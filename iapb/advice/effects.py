@@ -101,7 +101,7 @@ class Question:
         if self.scene.hand is None:
             return "the scene has no hand"
         if self.coupling == "none":
-            return "no coupling was asked for: the hand holds the tool itself"
+            return "no coupling was chosen: the hand holds the tool itself"
         wanted = COUPLING_FIELDS.get(self.coupling or "", "")
         return "" if self.gains is not None else f"the scene gives no gains under couplings{'.' * bool(wanted)}{wanted}"
 

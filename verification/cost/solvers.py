@@ -124,8 +124,8 @@ def printed_faster(table: Table) -> str:
     lost = [size for size in ours.keys() & theirs.keys() if costs_more(theirs[size], ours[size]) is False]
     most = max((ours[size]["median"] / theirs[size]["median"] for size in lost), default=0.0)
     sizes = " to ".join(map(str, sorted({min(lost), max(lost)}))) if lost else ""
-    return (f"On piles of {sizes} independent contacts the printed formula is up to {most:.2g} times as fast as the "
-            "engine") if lost else ""
+    return (f"On piles of {sizes} independent contacts the printed formula is up to {most:.2g} times as fast as "
+            "IAPB") if lost else ""
 
 
 def faster(how: str, rival: str, what: str, outcomes: Sequence[bool | None], where: str) -> Part:
@@ -135,7 +135,7 @@ def faster(how: str, rival: str, what: str, outcomes: Sequence[bool | None], whe
         return Part(f"Time of one impact, {how}: nothing was timed that differs clearly from IAPB.", NOT_COMPUTED,
                     timed=True)
     return target(
-        f"Time of one impact, from M, J and v to v⁺ at the same accuracy; {how}",
+        f"Time of one impact, from M, J and v to v⁺ (equal to {_SOLVED:g}); {how}",
         f"IAPB is faster than {rival} in {count - slower} of the {count} {what} whose times differ clearly"
         f"{f' ({more} more are undecided)' * bool(more)}{where and f'. IAPB is slower {where}'}",
         "IAPB is faster in all", not slower,

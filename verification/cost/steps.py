@@ -237,5 +237,5 @@ def _bodies_say(table: Table) -> Iterator[Part]:
 
 BODIES = Check(
     key="bodies", question="How does the time of a step grow with the number of free bodies?", cases=lambda _: COUNTS,
-    row=step_of_bodies, says=_bodies_say, timed=("step",), digits=3, note="Contacts: mean over the steps.",
+    row=step_of_bodies, says=_bodies_say, timed=("step",), digits=3, note="Discs near a wall. Contacts: means.",
 )  # fmt: skip
