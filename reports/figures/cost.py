@@ -124,7 +124,7 @@ def _lost_on_hard_impacts(numbers: Table) -> tuple[str, str]:
         for c in dict.fromkeys(numbers.column("contacts")):
             here, cases = lost.where(contacts=c), set(numbers.where(called=called, contacts=c).column("problem"))
             best = max(here.records(), key=lambda row: float(row["ratio"]), default=None)
-            told = "none: IAPB is the fastest" if best is None else (
+            told = "none is faster" if best is None else (
                 f"{best['solver']}: up to {best['ratio']:.2g} times as fast; IAPB loses on "
                 f"{len(set(here.column('problem')))} of {len(cases)} impacts")
             lines.setdefault(_contacts({"contacts": c}), []).append(told)

@@ -463,9 +463,9 @@ WORTH = Check(
         "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
     note="Errors are position errors in body lengths. The factor in time for a tenth of the error is a median over "
-    "the scenes; least and largest cost are its range. It is fitted to consecutive time steps between which the error "
-    f"falls by a factor of at least {GAINED:g}; a fit needs {FIT_RUNS} runs and a total fall by a factor of "
-    f"{FIT_FALL:g}. Best for its time: scenes with a run (error up to {USEFUL:g}) such that no other run is both "
-    "faster and more accurate. Energy made: the largest rise above the energy at the start, relative to the largest "
-    "kinetic energy. Failed: also runs that are too slow.",
+    "the scenes. It is fitted to consecutive time steps between which the error falls by a factor of at least "
+    f"{GAINED:g}; a fit needs {FIT_RUNS} runs and a total fall by a factor of {FIT_FALL:g}. Best for its time: scenes "
+    f"with a run (error up to {USEFUL:g}) such that no other run is both faster and more accurate. Energy made: the "
+    "largest rise above the energy at the start, relative to the largest kinetic energy. Failed: also runs that are "
+    "too slow.",
 )  # fmt: skip
