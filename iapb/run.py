@@ -192,7 +192,7 @@ class Run:
         end = "" if self.complete else f", stopped: {self.stopped}"
         deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
         return (f"{self.scene_name} in {self.world}: {self.steps} steps of {1e3 * self.dt:.4g} ms{end}, "
-                f"{len(self.impacts.step)} impacts, at most {1e3 * deepest:.3g} mm deep")
+                f"{len(self.impacts.step)} impacts, penetration at most {1e3 * deepest:.3g} mm")
 
     def _repr_html_(self) -> str:
         """The summary and the last state as a small table, for notebooks."""

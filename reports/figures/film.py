@@ -54,7 +54,8 @@ def _film(key: str, *runs: Run) -> Drawn:
                f'style="max-width: 620px">{film.walls()}{"".join(film.bodies())}{"".join(film.marks())}</svg>')
         panels.append(Panel(svg, alt, label, film=True))
         rows.append((label, float(run.time[-1]), run.steps, len(run.contacts.gap), len(run.impacts.step)))
-    return Drawn(panels, titled(("world", "simulated [s]", "steps", "contacts", "impacts"), rows, digits=3))
+    titles = ("world", "simulated [s]", "steps", "contacts, summed over the steps", "impacts")
+    return Drawn(panels, titled(titles, rows, digits=3))
 
 
 RECIPES = tuple(recipe(key, *runs.values())(partial(_film, key)) for key, runs in FILMS.items())
