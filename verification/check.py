@@ -164,7 +164,7 @@ class Check:
 
     def conclude(self, table: Table, study: Study | None = None) -> Finding:
         """Return the finding on a claim from its judged table; without a study it draws no fresh cases."""
-        parts = [Part("No case tests it.", NOT_TESTABLE, name) for name in self.untested]
+        parts = [Part("No trial tests it.", NOT_TESTABLE, name) for name in self.untested]
         for name, rows in by_part(table).items():
             role = _of_part(self.roles, name)
             judged = judge_part(name, rows, None if role else self._fresh(study, name))  # a role decides nothing

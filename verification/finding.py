@@ -240,7 +240,7 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
     held, decided, total = trials.holds.count(True), len(trials.decided), len(trials.rows)
     said = f"holds in {held} of {decided} trials" if decided else "no trial can tell"
     if 0 < decided < total:
-        said = f"{said}; {total - decided} of {total} cannot tell"
+        said = f"{said}; {total - decided} more cannot tell"
     part = Part("", verdict, name, held, decided, total - decided, None, _where_it_fails(trials), timed)
     if verdict == MIXED or (verdict == REFUTED and held >= LEAST_DECIDED):
         region, tried = confirmed(trials, fresh)

@@ -94,14 +94,15 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
     if False in drawn.holds:
         return None, f"no range of conditions is confirmed: {region} fails in {_failing(drawn)} fresh trials"
     region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
-    new = f" and {region.fresh} fresh" if fresh else ""
+    new, kind = (f" and {region.fresh} fresh ones", "fresh") if fresh else ("", "other")
     open_ = drawn.holds.count(None) + inside.holds.count(None)
-    counts = f"{region.searched} trials that led to this range, {region.others} other{new} trials hold"
+    counts = f"{region.searched} trials that led to this range, {region.others} others{new}"
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
-        return None, f"no range of conditions is confirmed: where {region}, only {counts}"
+        least = f"{LEAST_CONFIRMING} {kind} ones must confirm a range"
+        return None, f"no range of conditions is confirmed: where {region}, it holds in {counts}, but {least}"
     covered = f" ({region.share:.0%} of the tested range)" if region.share else ""
     undecided = f"; {open_} more cannot tell" if open_ else ""
-    return region, f"where {region}{covered}, all {counts}{undecided}"
+    return region, f"where {region}{covered}, it holds in all {counts}{undecided}"
 
 
 def _failing(trials: Table) -> str:

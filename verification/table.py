@@ -185,8 +185,8 @@ def by_part(table: Table) -> dict[str, Table]:
 
 def ranges(table: Table) -> str:
     """Return the conditions of a table in words: each with its values, or with its range if there are many."""
-    return "; ".join(f"{column.key.replace('_', ' ')} {_span(table.column(column.key))} {column.unit}".rstrip()
-                     for column in table.columns if column.condition and table.rows)  # fmt: skip
+    return "; ".join(f"{column.key.replace('_', ' ')} {span} {column.unit}".rstrip() for column in table.columns
+                     if column.condition and (span := _span(table.column(column.key))))  # fmt: skip
 
 
 def _span(values: Sequence[Any]) -> str:

@@ -219,7 +219,7 @@ def of_runs(patch, folder, failures):
 
 
 @pytest.mark.parametrize(("stage", "failed"), [
-    (of_claims, ["C01", "C07, slender rods, 0.0, 0.1", "C07, point masses at the tips, 0.0, 0.1"]),
+    (of_claims, ["C01", "C07, uniform rods, 0.0, 0.1", "C07, point masses at the ends of the links, 0.0, 0.1"]),
     (of_effects, ["peg_corner, impulses", "arm_pushing"]), (of_runs, ["hole/IAPB"]),
 ])  # fmt: skip
 def test_a_case_that_raises_costs_its_row_only(stage, failed, monkeypatch, tmp_path):

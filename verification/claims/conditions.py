@@ -2,7 +2,8 @@
 
 A trial starts from a tilt, a clearance and a travel. The clearance is the distance from the wall to the peg's nearest
 corner when the hand begins to push; the travel is the same distance from the floor. The other conditions are friction,
-stiffness and damping of the walls, the approach velocity from which a contact collides, and the device's force limit.
+stiffness and damping of the walls, the collision threshold (a contact that approaches faster collides), and the
+device's force limit.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from verification.scenes.measures import HALF_SIZE
 
 UNITS = {
     "tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",
-    "approach_velocity": "m/s", "force_limit": "times the paper's",
+    "collision_threshold": "m/s", "force_limit": "times the paper's",
 }  # fmt: skip
-START = ("tilt", "clearance", "travel", "friction", "approach_velocity")  # conditions that most claims vary
+START = ("tilt", "clearance", "travel", "friction", "collision_threshold")  # conditions that most claims vary
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 
 # The conditions that each world ignores: one run of a world serves all values of these conditions. The device's limits
 # act on PB, and on IAPB unless it renders in full.
-_RIGID_IGNORES = ("friction", "stiffness", "damping", "approach_velocity", "force_limit")
-IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("approach_velocity",), "IAPB": ()}
+_RIGID_IGNORES = ("friction", "stiffness", "damping", "collision_threshold", "force_limit")
+IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("collision_threshold",), "IAPB": ()}
 
 
 @dataclass(frozen=True)
 class Condition:
     """One variation of the peg scene, with the units of UNITS; friction, stiffness and damping are those of the walls.
 
-    A contact collides above `approach_velocity`; `force_limit` of the device is a multiple of the paper's limit.
+    A contact collides above `collision_threshold`; `force_limit` of the device is a multiple of the paper's limit.
     """
 
     tilt: float = 0.015
@@ -42,7 +43,7 @@ class Condition:
     friction: float = 0.0
     stiffness: float = 1000.0
     damping: float = 50.0
-    approach_velocity: float = 1e-6
+    collision_threshold: float = 1e-6
     force_limit: float = 1.0
 
     def __str__(self) -> str:
@@ -70,7 +71,7 @@ class Condition:
             "contact.friction": self.friction,
             "contact.stiffness": self.stiffness,
             "contact.damping": self.damping,
-            "contact.approach_velocity": self.approach_velocity,
+            "contact.approach_velocity": self.collision_threshold,
             "device.force_limit": [self.force_limit * limit for limit in F_LIMIT],
         })  # fmt: skip
 
@@ -86,29 +87,29 @@ EVEN_TILTS = tuple(n / 20 for n in range(8))
 FRICTIONS = (0.1, 0.3)
 # With 1e-6 every approaching contact collides, as in the paper. An existing contact that the hand pushes slowly into
 # its wall also approaches, at up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the last value excludes such contacts.
-APPROACH_VELOCITIES = (1e-3, 1e-2)
+COLLISION_THRESHOLDS = (1e-3, 1e-2)
 TIGHT = 0.3  # times the paper's limits: below the penalty forces of a hard landing
 STIFFNESSES = (250.0, 500.0, 1000.0, 2000.0, 4000.0)
 DAMPINGS = (0.0, 12.5, 25.0, 50.0, 100.0)
 
 
 def start_conditions(depth: str) -> tuple[Condition, ...]:
-    """Return all tilts x clearances x approach velocities, more travels at three tilts, more frictions at all tilts."""
+    """Return all tilts x clearances x thresholds, more travels at three tilts, more frictions at all tilts."""
     grid = [Condition(tilt, clearance) for tilt in TILTS[depth] for clearance in CLEARANCES[depth]]
     travels = [Condition(tilt, travel=travel) for tilt in (0.0, 0.03, 0.1) for travel in TRAVELS[depth]]
     frictions = [Condition(tilt, friction=friction) for tilt in TILTS[depth] for friction in FRICTIONS]
-    approaches = [replace(start, approach_velocity=speed) for start in grid for speed in APPROACH_VELOCITIES]
-    return tuple(dict.fromkeys(grid + travels + frictions + approaches))
+    thresholds = [replace(start, collision_threshold=speed) for start in grid for speed in COLLISION_THRESHOLDS]
+    return tuple(dict.fromkeys(grid + travels + frictions + thresholds))
 
 
-# Every tilt and clearance of the full depth, at the paper's approach velocity.
+# Every tilt and clearance of the full depth, at the paper's collision threshold.
 FULL_GRID = tuple(Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"])
 
 
 def limited_conditions(depth: str) -> tuple[Condition, ...]:
     """Return the starting conditions with the paper's device limits, and some with tighter limits (C12 to C14, C16)."""
     default = Condition()
-    starts = [start for start in start_conditions(depth) if start.approach_velocity == default.approach_velocity]
+    starts = [start for start in start_conditions(depth) if start.collision_threshold == default.collision_threshold]
     plain = [start for start in starts if start == replace(default, tilt=start.tilt)]
     return tuple(starts + [replace(start, force_limit=TIGHT) for start in plain])
 
@@ -124,7 +125,7 @@ def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) ->
 
     Tilt, clearance and travel come from one random sequence that all claims share: its first `count` starts inside the
     region. No region was chosen from these starts. Overlapping regions share the runs of the rigid worlds, which ignore
-    all other conditions. The other conditions are drawn between the region's ends, the approach velocity uniformly in
+    all other conditions. The other conditions are drawn between the region's ends, the collision threshold uniformly in
     its logarithm. All conditions vary at once. Values are rounded to four digits, so that every machine gets the same
     ones. If `PATIENCE` starts in a row miss a thin region, further starts are drawn inside that region.
     """
@@ -138,7 +139,7 @@ def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) ->
             missed += 1
             continue
         missed = 0 if patient else missed
-        others = {name: _between(*ends[name], shares[name], by_decades=name == "approach_velocity")
+        others = {name: _between(*ends[name], shares[name], by_decades=name == "collision_threshold")
                   for name in UNITS if name not in RANGES}  # fmt: skip
         found.append(Condition(**start, **others))
     return found

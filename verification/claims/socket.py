@@ -86,27 +86,27 @@ def _says(table: Table) -> str:
         sorted(clustering.column(f"{kind}{without}"))[len(clustering.rows) // 2] if clustering.rows else "no"
         for kind in ("false collisions", "doubled contacts") for without in ("", " without filters"))
     return (
-        "The paper's condition, a coherence distance above speed × step, is not sufficient. The contact on the next "
-        f"facet is {1e3 * edge_jump(max(FACETS)):.2g} to {1e3 * edge_jump(min(FACETS)):.2g} mm away, and the distance "
-        f"must reach it as well: with both filters no false collision remains in {sum(reaching.decided)} of "
-        f"{len(reaching.decided)} trials in which the coherence distance is at least this jump + speed × step, and in "
-        f"{sum(short.decided)} of {len(short.decided)} trials with a shorter one. The finer the facets, the nearer "
-        "this is to the paper's condition. In the other trials of the first kind, "
-        f"{sum(reaching.column('false collisions'))} false collisions remain, "
-        f"{sum(reaching.column('collisions on return'))} of them when a ball that bounced off the facets returns; "
-        "it bounces if the damping is small. Clustering alone removes duplicate contacts (median "
-        f"{doubled}, against {all_contacts} without it), but the contact that is left jumps from facet to facet and is "
-        f"new each time: the median is {collisions} false collisions, against {unfiltered} without any filter."
+        "The paper's condition, a coherence distance above speed × step, is not sufficient. At an edge the contact "
+        f"jumps by {1e3 * edge_jump(max(FACETS)):.2g} to {1e3 * edge_jump(min(FACETS)):.2g} mm to the next facet, and "
+        "the distance must cover this jump as well. With both filters no false collision remains in "
+        f"{sum(reaching.decided)} of {len(reaching.decided)} trials whose coherence distance is at least jump + speed "
+        f"× step, and in {sum(short.decided)} of {len(short.decided)} trials with a shorter one. With finer facets the "
+        "jump is smaller, so the paper's condition is nearly enough. In the other trials with at least jump + speed × "
+        f"step, {sum(reaching.column('false collisions'))} false collisions remain, "
+        f"{sum(reaching.column('collisions on return'))} of them when a ball returns that bounced off the facets, as "
+        f"balls do if the damping is small. Clustering alone removes duplicate contacts (median {doubled}; without "
+        f"filters {all_contacts}), but the contact that is left jumps from facet to facet and is new each time (median "
+        f"{collisions} false collisions; without filters {unfiltered})."
     )  # fmt: skip
 
 
 C18 = Check(
     key="C18", question="Clustering and temporal coherence remove false collisions.", place="Section III",
     quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. The facets "
-    "approximate a round socket, in which a rolling ball does not collide again; so each collision is false. Speed: "
-    "the largest of a ball that rolls without loss. Jump to the next facet: distance between the contacts at an "
-    "edge.",
-    tolerance="No false collision remains. A trial without any when both filters are off cannot tell.",
+    "approximate a round socket, in which a rolling ball does not collide again; so each of these is false. Speed: the "
+    "largest speed of a ball that rolls without loss. Jump to the next facet: distance between the ball's two contacts "
+    "at an edge. Relative coherence distance: coherence distance / (jump + speed × step).",
+    tolerance="No false collision remains. A trial cannot tell if there is none even without filters.",
     cases=_cases, row=_row, says=_says, draw=_draw, parts=["part"],
     holds=lambda row: bool(row["false collisions"] == 0) if row["false collisions without filters"] else None,
     roles={COHERENCE_ALONE: BEYOND, CLUSTERING: BEYOND},

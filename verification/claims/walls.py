@@ -55,17 +55,17 @@ def _form(run: Run, step: int, v: Floats) -> float:
 C17 = Check(
     key="C17", question="The energy lost on impact does not depend on contact stiffness and damping.",
     place="Section II",
-    quantity="Largest difference between the energy lost in an impact and ½(1 − e²) vᵀJᵀW†Jv of the velocity v before "
-    "it, relative to this form. J is made from the recorded contacts.",
+    quantity="Largest difference between the energy lost in an impact and ½(1 − e²) vᵀJᵀW†Jv with the velocity v "
+    "before the impact, relative to this form. J is made from the recorded contacts.",
     tolerance="1e-12 of the form, the rounding of some dozens of products.",
     cases=lambda study: [Condition(tilt, stiffness=stiffness, damping=damping) for tilt in (0.0, 0.1)
                          for stiffness in STIFFNESSES for damping in DAMPINGS],
     row=_losses, conditions=["tilt", "stiffness", "damping"], counts=["impacts"],
     holds=lambda row: bool(row["error"] <= 1e-12) if row["impacts"] else None,
-    says=lambda table: f"The loss in {sum(table['impacts'])} impacts at {len(table.rows)} walls differs from ½(1 − e²) "
-    f"vᵀJᵀW†Jv by at most {max(table['error']):.1e} of it. This form contains the velocity before the impact, the "
-    "masses and the contacts, but no stiffness and no damping. Later impacts of a run start from velocities that the "
-    "walls have changed; only through these do their losses depend on the wall.",
+    says=lambda table: f"In {sum(table['impacts'])} impacts of {len(table.rows)} runs, the loss differs from the form "
+    f"½(1 − e²) vᵀJᵀW†Jv by at most {max(table['error']):.1e} of the form. The form contains the velocity before the "
+    "impact, the masses and the contacts, but no stiffness and no damping. Later impacts of a run start from "
+    "velocities that the wall has changed; their losses depend on the wall only through these velocities.",
     axes=("stiffness", "damping", "tilt"),
 )  # fmt: skip
 
@@ -106,19 +106,19 @@ def _leak_says(table: Table) -> str:
     undamped = table.where(**{"device damping": 0.0})
     most, fed = max(undamped.column("energy from the wall")), sum(map(_leaks, undamped.records()))
     worst = max(row["energy from the wall"] / row["wall's turnover"] for row in table.records() if _within(row))
-    return ("At each wall one motion of the hand is tried: the one that draws the most energy from it. If the device "
-            f"damping b is at least KT/2 + B, it draws at most {worst:.1g} of the wall's turnover. Otherwise it "
-            "draws energy as long "
-            f"as it lasts. With a device without damping, as in the paper, it draws energy from {fed} of "
-            f"{len(undamped.rows)} walls (up to {most:.2g} J in {_STEPS} samples).")
+    return ("At each wall we try the motion of the hand that draws the most energy. If the device damping b is at "
+            f"least KT/2 + B, the hand draws at most {worst:.1g} of the wall's turnover. Otherwise it draws energy as "
+            "long as the motion lasts. Through a device without damping, as in the paper, the hand draws energy from "
+            f"{fed} of {len(undamped.rows)} walls (up to {most:.2g} J in {_STEPS} samples).")
 
 
 C20 = Check(
     key="C20", question="Virtual damping is bounded by physical damping, stiffness and step: b > KT/2 + |B|.",
     place="Section VII, after Colgate and Schenkel",
-    quantity="Energy that the hand draws from the engine's penalty force (5), sampled with period T and held, by the "
-    "motion that draws most: to and fro at half the sampling rate, entirely inside the wall.",
-    tolerance="1e-11 of the wall's turnover (b + KT/2 + B) Σ Δx²/T: the rounding of the sums.",
+    quantity="Energy that the hand draws from a wall of stiffness K and damping B, whose penalty force (5) is sampled "
+    "every T and held, through a device of damping b. The motion to and fro at half the sampling rate, entirely inside "
+    "the wall, draws most.", tolerance="1e-11 of the wall's turnover (b + KT/2 + B) Σ Δx²/T, where Δx is the motion in "
+    "one sample: the rounding of the sums.",
     cases=lambda study: [
         (rate, stiffness, device, share) for rate in (512.0, 1000.0) for stiffness in WALL_STIFFNESSES
         for device in DEVICE_DAMPINGS for share in (OF_BOUND if device > 1.0 else (0.0, 1.0))
@@ -185,33 +185,32 @@ def _settling_says(table: Table) -> str:
         rows = table.where(against=rival, test=WHEREVER).records()
         ours, theirs = (np.isinf([row[f"{law} after"] for row in rows])
                         for law in ("impulses settle", "penalty settles"))  # fmt: skip
-        never[rival] = (f"{(theirs & ~ours).sum()} walls settle only with impulses and {(ours & ~theirs).sum()} only "
-                        "with penalties")  # fmt: skip
+        never[rival] = (f"{(theirs & ~ours).sum()} of {len(rows)} walls settle only with impulses and "
+                        f"{(ours & ~theirs).sum()} only with penalties")  # fmt: skip
         settle[rival] = f"{(~theirs).sum()} of {len(rows)}"
     sooner = table.where(against=BOTH, test=NO_LATER).decided
     return (
         f"At the paper's damping of 50 N s/m, {never[SAME_DAMPING]}. At some other dampings, the same for both, walls "
-        "settle only with penalties; the page Stability of contact counts them. If the penalties have the damping that "
-        f"gives the force of the impulse, {never[EQUAL_GAIN]}. The paper prints that such a damping, sustained, “would "
-        "cause the system to be stable”. Its argument needs “unstable”. We test: wherever "
-        f"penalties with this damping settle, impulses settle, too. With this damping {settle[EQUAL_GAIN]} walls "
-        "settle. Beyond the paper: if the "
-        f"penalties have the best damping for each wall, {never[TUNED]}. With the best damping of each law for each "
-        f"wall, {never[BOTH]}, and impulses settle no later at {sum(sooner)} of "
-        f"{len(sooner)} walls. The paper says that there are no guidelines for the choice of a large damping."
+        "settle only with penalties; the page Stability of contact counts them. If penalties have the damping whose "
+        f"force at first contact equals that of the impulse, {never[EQUAL_GAIN]}. The paper prints that such a "
+        "damping, sustained, “would cause the system to be stable”; its argument needs “unstable”. We test whether "
+        f"impulses settle every wall that penalties with this damping settle ({settle[EQUAL_GAIN]} walls). Beyond the "
+        f"paper: if penalties have the best damping for each wall and impulses 50 N s/m, {never[TUNED]}. With the best "
+        f"damping of each law for each wall, {never[BOTH]}, and impulses settle no later at {sum(sooner)} of "
+        f"{len(sooner)} walls. The paper says that no guidelines for the choice of a large damping exist."
     )
 
 
 C21 = Check(
     key="C21", question="Impulses make contact more stable than a sustained damping of the same gain.",
     place="Section VII",
-    quantity="Settling time of a mass of 2 kg that the hand pushes against a sampled wall; its motion between samples "
-    "is exact. Impulses at the paper's damping are compared with penalties at the same damping, and with penalties at "
-    "the damping (1 + e) m/T, whose force at first contact equals that of the impulse (in the paper: equivalent gain). "
-    "Beyond the paper: which law settles sooner, and penalties or both laws at their best damping of at least 50 N s/m "
-    "for each wall, chosen afterwards.",
-    tolerance="None: the mass settles within three seconds or not. A trial cannot tell if it settles with neither "
-    "law; of “every wall”, if it does not settle without impulses.",
+    quantity="Settling time of a mass of 2 kg that the hand pushes against a sampled wall (“the wall settles”). The "
+    "motion between samples is exact. Impulses at the paper's damping are compared with penalties at the same damping, "
+    "and with penalties at the damping (1 + e) m/T, whose force at first contact equals that of the impulse (in the "
+    "paper: equivalent gain). Beyond the paper: which law settles sooner; and penalties, or both laws, at the damping "
+    "of at least 50 N s/m that settles each wall soonest, chosen afterwards.",
+    tolerance="None: the mass settles within three seconds or not. A trial cannot tell if the mass settles with "
+    "neither law; a trial of “every wall” cannot tell either if the mass does not settle without impulses.",
     roles={NO_LATER: BEYOND, BOTH: BEYOND, TUNED: BEYOND},
     cases=lambda study: [(loop, grid(study.depth)[0]) for loop in loops()], row=_settling, holds=_settles,
     says=_settling_says, draw=_draw, parts=["against", "test"],
