@@ -89,17 +89,16 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
         contradicted = f"{region} fails in {_failing(inside)} other trials" if region else ""
         region, inside = (search_region(trials), trials.only(())) if fresh else (None, inside)
         if region is None:
-            return None, f"no range of conditions is confirmed: {contradicted}" if contradicted else "no range is found"
+            return None, f"no range is confirmed: {contradicted}" if contradicted else "no range is found"
     drawn = fresh(region) if fresh else inside.only(())
     if False in drawn.holds:
-        return None, f"no range of conditions is confirmed: {region} fails in {_failing(drawn)} fresh trials"
+        return None, f"no range is confirmed: {region} fails in {_failing(drawn)} fresh trials"
     region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
-    new, kind = (f" and {region.fresh} fresh ones", "fresh") if fresh else ("", "other")
+    new, kind = (f" and {region.fresh} fresh ones", "fresh ones") if fresh else ("", "others")
     open_ = drawn.holds.count(None) + inside.holds.count(None)
     counts = f"{region.searched} trials that led to this range, {region.others} others{new}"
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
-        least = f"{LEAST_CONFIRMING} {kind} ones must confirm a range"
-        return None, f"no range of conditions is confirmed: where {region}, it holds in {counts}, but {least}"
+        return None, f"no range is confirmed: where {region}, it holds in {counts}; it takes {LEAST_CONFIRMING} {kind}"
     covered = f" ({region.share:.0%} of the tested range)" if region.share else ""
     undecided = f"; {open_} more cannot tell" if open_ else ""
     return region, f"where {region}{covered}, it holds in all {counts}{undecided}"

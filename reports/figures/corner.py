@@ -211,7 +211,7 @@ def _forces(key: str, traces: Traces) -> list[Panel]:
     for k, title, name, unit, cut in _DRAWN:
         values = {curve: trace.device_force[:, k] for curve, trace in traces.items()}
         for suffix, view, last, height in (("c", f"{np.ptp(_AT_CONTACT):.2g} s around first contact", ends[0], None),
-                                           ("m", "until all are at rest, pulses cut off", window.stop, cut)):
+                                           ("m", "until all worlds rest, pulses cut off", window.stop, cut)):
             panels.append(_over_time(f"{key}-{k}{suffix}", traces, values, f"{name} [{unit}]", f"{title}, {view}",
                                      max(start, 0), last, height, drawstyle="steps-post"))  # fmt: skip
     return panels

@@ -115,7 +115,7 @@ def map_of(claim: Finding) -> Figure | None:
     table = claim.tables.get(claim.key)
     if not claim.axes or claim.verdict == finding.REPRODUCED or table is None or not table.rows:
         return None
-    caption = f"Each mark is one simulated condition of {claim.key}."
+    caption = f"Each mark is one pair of conditions of {claim.key}; the dot is smaller if only some of its trials hold."
     return condition_map(f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes)
 
 

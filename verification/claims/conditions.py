@@ -2,8 +2,7 @@
 
 A trial starts from a tilt, a clearance and a travel. The clearance is the distance from the wall to the peg's nearest
 corner when the hand begins to push; the travel is the same distance from the floor. The other conditions are friction,
-stiffness and damping of the walls, the collision threshold (a contact that approaches faster collides), and the
-device's force limit.
+stiffness and damping of the walls, the collision threshold (see `Condition`), and the device's force limit.
 """
 
 from __future__ import annotations

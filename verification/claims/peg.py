@@ -326,7 +326,7 @@ C12 = peg_claim(
     quantity="RMS distance of the device trajectory from that of the ideal world, per coordinate; largest overlap of "
     "the walls with the peg at the place of the device; settling time of C15. The paper says of saturated impulses "
     "that the overlap is largest, that the settling time increases and that the transient response is poorest (tested "
-    "as: the longest settling time). Beyond the paper: both when spreading. No start has friction.",
+    "as: the longest settling time). Beyond the paper: the last two for spreading. No start has friction.",
     tolerance="Saturating loses most: strictly the largest value of the three ways (saturated, scaled, spread). "
     "Spreading loses least: strictly the smallest. Saturating increases the settling time: strictly longer than with "
     "full impulses. A trial cannot tell if no impulse reaches the limit; if the lead over the next way is below 2.5e-5 "
@@ -447,20 +447,19 @@ def _settling_says(table: Table) -> str:
     texts = []
     for rendering in ("full", "spread"):
         hops, times = (table.where(part=part, rendering=rendering) for part in (FEWER, SETTLES))
-        texts.append(
-            f"With {rendering} impulses, IAPB has {sum(hops['IAPB']):g} bounces in {len(hops.rows)} runs (PB "
-            f"{sum(hops['PB']):g}) and settles after {np.median(times['IAPB']):.2f} s (PB {np.median(times['PB']):.2f} "
-            "s), as medians.")
+        texts.append(f"With {rendering} impulses, IAPB has {sum(hops['IAPB']):g} bounces in {len(hops.rows)} runs (PB "
+                     f"{sum(hops['PB']):g}). The median settling time is {np.median(times['IAPB']):.2f} s (PB "
+                     f"{np.median(times['PB']):.2f} s).")
     smooth = table.where(part=SETTLES, friction=0.0).decided
     texts.append(f"Without friction, IAPB settles sooner in {sum(smooth)} of {len(smooth)} trials that can tell.")
     return ("The paper reports an experiment, which we did not repeat. The verdict is on a simulation in which the "
-            f"device is the pure mass of Section VI and every approaching contact collides, as in the paper. "
+            "device is the pure mass of Section VI and every approaching contact collides, as in the paper. "
             f"{' '.join(texts)} A run that never settles counts as settling at its end.")
 
 
 C15 = peg_claim(
     "C15", "With IAPB at 512 Hz, with or without device limits, the peg bounces less and settles sooner than with PB.",
-    place="Section VII, Fig. 12 and 13 (an experiment there; a simulation of the pure mass of Section VI here)",
+    place="Section VII, Fig. 12 and 13 (there an experiment; here a simulation)",
     quantity="How often a corner of the device's peg leaves a wall by more than 10 µm after touching it; time from "
     "the first contact until the device stays below 1 mm/s and 0.01 rad/s. Beyond the paper: larger collision "
     "thresholds.", note="Settling times in s. Lead: value of PB minus value of IAPB.",
