@@ -98,7 +98,7 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
     open_ = drawn.holds.count(None) + inside.holds.count(None)
     counts = f"{region.searched} trials that led to this range, {region.others} others{new}"
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
-        return None, f"no range is confirmed: where {region}, it holds in {counts}; it takes {LEAST_CONFIRMING} {kind}"
+        return None, f"no range is confirmed: where {region}, it holds in {counts}; needed: {LEAST_CONFIRMING} {kind}"
     covered = f" ({region.share:.0%} of the tested range)" if region.share else ""
     undecided = f"; {open_} more cannot tell" if open_ else ""
     return region, f"where {region}{covered}, it holds in all {counts}{undecided}"
