@@ -175,7 +175,7 @@ LAWS: dict[str, Law] = {law.name: law for law in (
         "Glocker and Pfeiffer 1995; Anitescu and Potra 1997", "any E in [0, 1], any gamma_minus", True, poisson),
     Law("newton_equality", "gamma_plus = -E gamma_minus, p of either sign",
         "Constantinescu, Salcudean, Croft 2005, (15)-(21)", "one e for all contacts", True, newton_equality),
-    Law("per_body_equality", "newton_equality on the rows of each body apart",
+    Law("per_body_equality", "newton_equality with separate rows for each body",
         "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
         "one e for all contacts; momentum is not conserved at self-collisions", True, newton_equality),
     Law("coulomb_ncp", "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",

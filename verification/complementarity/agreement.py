@@ -166,38 +166,40 @@ def _map_says(table: Table) -> Iterator[Part]:
     """Yield the parts on the statements, on the project's scenes, and on contacts that touch without approaching."""
     rows = table.records()
     yield Part.of(
-        "With equal e the two laws agree if and only if some p >= 0 gives IAPB's velocity",
-        f"{sum(table['contradictions'])} of {sum(table['cases'])} impacts contradict this. Where the laws differ, "
-        "IAPB loses more energy than the LCP, by ½ (1−e)/(1+e) times the square of the distance (correct to "
-        f"{max(table['defect']):.0e}). The extra loss is at most {max(table['largest extra loss of KE⁻']):.0%} of KE⁻",
+        "With one e for all contacts, the two laws agree if and only if some p >= 0 gives IAPB's velocity",
+        f"{sum(table['contradictions'])} of {sum(table['cases']):,} impacts contradict this. If the velocities differ "
+        "by Δ in the kinetic metric, IAPB loses ½ (1−e)/(1+e) Δ² more energy than the LCP (largest error: "
+        f"{max(table['defect']):.0e}), at most {max(table['largest extra loss of KE⁻']):.0%} of KE⁻",
         "no contradiction", "", "statements")
     if scenes := [row for row in rows if row["impacts"].startswith("scene ")]:
         apart = sorted({row["impacts"].removeprefix("scene ") for row in scenes if row["share that agrees"] < 1.0})
         pulling = sum(round(row["share that truly pulls"] * row["cases"]) for row in scenes)
         yield Part.of(
-            f"Impacts of the project's scenes, each run with its own e and with e = {SCENE_RESTITUTIONS[1]:g}",
-            f"{pulling} of {sum(row['cases'] for row in scenes)} impacts need a pulling impulse, because no p >= 0 "
-            f"gives the velocity of (21). The laws {'differ in ' + ', '.join(apart) if apart else 'agree in all'}",
-            "the laws agree in all scenes", MIXED if apart else REPRODUCED, "scenes")  # fmt: skip
+            "Do the laws agree in the impacts of the project's scenes? Each scene runs with its own e and with e = "
+            f"{SCENE_RESTITUTIONS[1]:g}", f"in {pulling} of {sum(row['cases'] for row in scenes)} impacts no p >= 0 "
+            "gives the velocity of (21), so an impulse must pull. The laws "
+            f"{'differ in the scenes ' + ', '.join(apart) if apart else 'agree in all scenes'}", "in all scenes",
+            MIXED if apart else REPRODUCED, "scenes")  # fmt: skip
     beside = table.where(impacts="with a neighbour")
     if beside.rows:
         ours, theirs = (float(np.mean(beside[f"left approaching by {law}"])) for law in ("IAPB", "the LCP"))
         yield Part.of(
             "A neighbouring contact that touches but does not approach has no row in (21). How often does it approach "
-            "after the impact?", f"in {100 * ours:.0f} % of such impacts with IAPB, and in {100 * theirs:.0f} % with "
-            "the LCP on the same rows", "never", verdict_of_share(1.0 - ours), "touching")  # fmt: skip
+            "after the impact?", f"in {100 * ours:.0f} % of the random impacts with such a neighbour by IAPB, "
+            f"in {100 * theirs:.0f} % by the LCP on the same rows", "never", verdict_of_share(1.0 - ours),
+            "touching")  # fmt: skip
 
 
 MAP = Check(
-    key="map", question="With equal e the laws agree if and only if some p >= 0 gives IAPB's velocity.",
+    key="map", question="With one e for all contacts, the laws agree if and only if some p >= 0 gives IAPB's velocity.",
     cases=lambda study: [*FAMILIES, *scene_names()],
     row=_compared, holds=lambda row: row["contradictions"] == 0 and row["defect"] <= PUSHED
     and row["momentum outside range(Jᵀ)"] <= MOMENTUM,
     says=_map_says, digits=3,
-    note="IAPB and the Newton LCP; distances are in the kinetic metric, relative to |v⁻|. An impact truly pulls if no "
-    "p >= 0 gives its velocity; it pulls as chosen if another p >= 0 would, but the least-norm p pulls. Left "
-    "approaching: share of impacts after which some contact approaches, even a touching one without a row. Defect: "
-    "error of the statement on distance and energy. Without impacts with per-body rows, friction or device limits.",
+    note="IAPB against the Newton LCP; distances of v⁺ are in the kinetic metric, relative to |v⁻|. Must pull: no p >= "
+    "0 gives IAPB's velocity. Pulls by choice: some p >= 0 gives it, but IAPB's p, the one of least norm, pulls. Left "
+    "approaching: a contact approaches after the impact, with or without a row in (21). Defect: largest error of the "
+    "distance and of extra loss / KE⁻ = (1−e)/(1+e) distance². Without per-body rows, friction and device limits.",
 )  # fmt: skip
 
 
@@ -219,7 +221,7 @@ def _two_contacts(study: Study, point: tuple[float, float, ImpactCase]) -> Row:
 
 
 TWO_CONTACTS = Check(
-    key="two contacts", question="For two contacts with approach speeds 1 and r, whose rows have the cosine c in the "
-    "kinetic metric, the laws agree exactly where r >= c.",
+    key="two contacts", question="Two contacts have rows of length 1 and cosine c in the kinetic metric, and approach "
+    "at speeds 1 and r <= 1. The laws agree if and only if r >= c.",
     cases=_grid, row=_two_contacts, holds=lambda row: row["agreement predicted"] == row["agreement found"], digits=3,
 )  # fmt: skip

@@ -142,7 +142,7 @@ CONVERGENCE = Check(
     cases=lambda study: [case for case in CASES if study.depth == "full" or case.scene in QUICK],
     row=lambda study, case: converge(case), spans=("order, positions", "order, velocities"), rule=verdict_of_trials,
     digits=3,
-    note="Each row shows the largest error of three time steps near the given one. Errors of positions are in the sup "
-    "norm [m, rad], errors of velocities in L¹ over time [m, rad]. A dash: the error is rounding alone. No "
-    f"event-driven solution exists for {', '.join(WITHOUT_TRUTH)}.",
+    note="Each row shows the largest error of three time steps near the given one; the row of the finer steps has the "
+    "verdict. Errors of positions are in the sup norm [m, rad], of velocities in L¹ over time [m, rad]. A dash: the "
+    f"error is rounding alone. No event-driven solution exists for {', '.join(WITHOUT_TRUTH)}.",
 )  # fmt: skip

@@ -117,13 +117,14 @@ def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | 
 
 
 FRICTION = Check(
-    key="friction", question="In impacts with dry friction, the world IAPB-friction never adds energy. Where every "
-    "contact pushes, its velocity equals that of Coulomb's law (a nonlinear complementarity problem, NCP). With e > 0 "
+    key="friction", question="In impacts with dry friction, the law of the world IAPB-friction never adds energy. If "
+    "every contact pushes, it gives the velocity of Coulomb's law (a nonlinear complementarity problem, NCP). With e > 0 "
     "the NCP and its convex relaxation (CCP) may add energy.",
     cases=lambda study: product(RESTITUTIONS, FRICTIONS), row=with_friction, rule=verdict_of_trials, digits=2,
     holds=lambda row: bool(row["share equal to the NCP"] == row["all contacts push"]
                            and row["largest change of KE, IAPB"] <= GAIN),
-    note="Changes of energy relative to KE⁻; positive values are gains.",
+    note="Columns 3 to 9 count impacts. Friction reduced: IAPB-friction scales it down so as to gain no energy. "
+    "Changes of energy are relative to KE⁻; positive values are gains.",
 )  # fmt: skip
 
 
@@ -145,9 +146,10 @@ def with_unequal(study: Study, signs: str, seed: int = 45) -> Row:
 
 
 UNEQUAL = Check(
-    key="unequal restitution", question="With unequal restitution, the engine gives the velocity of Poisson's law and "
-    "never adds energy. Plain equalities may add energy, and so may the Newton LCP if some contacts separate.",
+    key="unequal restitution", question="If e differs between contacts, the engine gives the velocity of Poisson's law "
+    "and never adds energy. Equalities v_n⁺ = −e v_n⁻ may add energy; so may the Newton LCP if some contacts separate.",
     cases=lambda study: ("all approach", "mixed signs"), row=with_unequal, digits=2,
+    note="The last three columns: largest (KE⁺ − KE⁻)/KE⁻ of each law. Mixed signs: some contacts separate before.",
     holds=lambda row: bool(row["distance from Poisson's law"] <= SAME_LAW
                            and row["largest change of KE, IAPB"] <= GAIN),
 )  # fmt: skip
@@ -167,5 +169,5 @@ def struck_bar(study: Study, law: str) -> Row:
 BAR = Check(
     key="struck bar", question="", digits=5, row=struck_bar,
     cases=lambda study: ("before", "newton_equality", "newton_lcp", "poisson", LAW_OF_UNEQUAL),
-    note="A bar struck at 0.5 and 0.4 of its length from its centre, with e = 1 and e = 0.",
+    note="The bar is struck at two contacts: with e = 1 at its end, with e = 0 at 0.4 of its length from the centre.",
 )  # fmt: skip

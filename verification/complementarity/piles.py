@@ -141,11 +141,11 @@ def _says(table: Table) -> Part:
     pulling = 100.0 * float(np.average([row["share of impulses that pull"] for row in beyond],
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
     return Part.of(
-        "In dense piles with every colliding contact as an equality (21), can impulses that push produce the velocity?",
-        f"in {agree:.0f} of {piles} impacts. The largest of these has {limit} contacts, which is no safe limit, "
-        f"because in many smaller ones they cannot. In impacts with more than {limit} contacts, {pulling:.0f} % of the "
-        "impulses pull. If impulses may only push (method \"poisson\", world IAPB-push), the velocity equals that of "
-        f"the LCP to {max(table['pushing from the LCP']):.0e}", "in all impacts",
+        "In impacts on dense piles, can pushing impulses (p >= 0) give the velocity of (21)?",
+        f"in {agree:.0f} of {piles} impacts, with up to {limit} contacts, but not in every impact with so few. In "
+        f"impacts with more than {limit} contacts, {pulling:.0f} % of the impulses of (21) pull. The world IAPB-push "
+        "(method \"poisson\") lets impulses only push; its velocities differ from the LCP's by at most "
+        f"{max(table['pushing from the LCP']):.0e} |v⁻|", "in all impacts",
         verdict_of_share(agree / piles), "piles",
         miss=f"in sphere piles with more than {limit} contacts, {pulling:.0f} % of the impulses pull instead of push")
 
@@ -155,8 +155,8 @@ def piles(folders: Iterable[Path | str]) -> Check:
     return Check(
         key="piles", question="", cases=lambda study: groups_of(study.depth, folders), row=group_rows, says=_says,
         timed=TIMES, digits=3,
-        note="The table compares (21), with every row as an equality, and impulses that only push (as in "
-        "the world IAPB-push), at e = 0. Distances are in the kinetic metric, relative to |v⁻|. A pile agrees if some "
-        "p >= 0 gives the velocity of (21). Contacts are left out so that redundancy varies. Times are those of calls "
-        "from Python, with checks of the arguments.",
+        note="Equation (21) against impulses that only push (as in the world IAPB-push), at e = 0. Each pile is "
+        "resolved twice, with the rows of the approaching and of all touching contacts. A random share of the contacts "
+        "is kept, so that redundancy varies; contacts and redundant: means. A pile agrees if some p >= 0 gives the "
+        "velocity of (21). Distances are in the kinetic metric, relative to |v⁻|. Times include the call from Python.",
     )  # fmt: skip

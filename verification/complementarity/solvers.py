@@ -125,6 +125,7 @@ def collections(folders: Mapping[str, Path | None]) -> tuple[Check, ...]:
     """Return a check for each folder by name (None: our own problems), and one with the profiles of all of them."""
     profile = Check(
         key="profile", question="", cases=lambda study: folders, timed=["share solved"], digits=3,
+        note="Share of the problems that a solver solves within this factor of the time of the fastest solver.",
         row=lambda study, name: [{"collection": name, **row}
                                  for row in on_problems(study, name, folders[name]).profile],
     )  # fmt: skip
@@ -133,11 +134,12 @@ def collections(folders: Mapping[str, Path | None]) -> tuple[Check, ...]:
 
 def _collection(name: str, folder: Path | None) -> Check:
     return Check(
-        key=name, question=f"{name[:1].upper()}{name[1:]}: a solver solves each problem, by recomputed residuals.",
+        key=name, question=f"{name[:1].upper()}{name[1:]}: at least one solver solves each problem.",
         cases=lambda study: on_problems(study, name, folder).lines, row=lambda study, line: line,
         holds=lambda row: "solved" in row.values(), rule=verdict_of_trials, timed=["spread of velocities"], digits=2,
-        note="Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. Spread: "
-        "largest difference of contact velocities among the solvers that solved it.",
+        note="Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. Missing: the "
+        "solver is not installed. Left out: it took too long before. Spread: largest difference of the solutions' "
+        "contact velocities, relative to the velocity scale.",
     )  # fmt: skip
 
 

@@ -38,8 +38,8 @@ def complementarity(folders: Mapping[str, Path], worlds: Iterable[str] = ()) -> 
         key="complementarity", title="Against complementarity",
         question="IAPB solves (21): every colliding contact separates at e times its approach speed, and impulses "
         "may pull. A linear complementarity problem (LCP) allows only pushing impulses and decides which contacts "
-        "push. Both laws are applied to the same impacts: random impacts of known geometry, every impact of the "
-        "project's scenes, and problems that solvers find hard. A solution counts only if its residuals, recomputed "
+        "push. Both laws are applied to the same impacts: random impacts of known geometry, impacts of the project's "
+        "scenes, and problems that solvers find hard. A solver's solution counts only if its residuals, recomputed "
         "from the problem, are small. Velocities after the impact are compared in the kinetic metric, relative to "
         "|v⁻|.",
         checks=(MAP, TWO_CONTACTS, piles(folders.values()), FRICTION, UNEQUAL, BAR, CONVERGENCE, REFERENCES,
@@ -55,21 +55,21 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     agree = sum(row["share that agrees"] * row["cases"] for row in found.records()) / cases
     held, fail = (sum(part.verdict == verdict for part in parts) for verdict in (REPRODUCED, REFUTED))
     return (f"IAPB and the LCP with Newton's law of restitution give the same velocity in {agree:.0%} of {cases:,} "
-            "impacts (random ones of several geometries and those of our scenes; the share depends on this choice). "
+            "impacts, random ones and those of our scenes (another choice of impacts would give another share). "
             f"They agree if and only if pushing impulses (p >= 0) can produce IAPB's velocity: "
             f"{sum(found['contradictions']) or 'no'} exceptions were found. Of the {len(parts)} findings on the page, "
             f"{held} hold in full, {len(parts) - held - fail} in part, and {fail} {'fails' if fail == 1 else 'fail'}.")
 
 
 REFERENCES = Check(
-    key="references", question="The engine's mass matrix M, forces B + G and gaps of contacts agree to 1e-12 with "
-    "references: Pinocchio for M and B + G, closed forms for gaps.",
+    key="references", question="The engine's mass matrix M and forces B + G (Coriolis, centripetal, gravity) agree to "
+    "1e-12 with Pinocchio, and its gaps of contacts with closed forms.",
     cases=lambda study: scene_names(), digits=2,
     row=lambda study, name: scene_difference(load_scene(find_scene(name)), CONFIGURATIONS),
     holds=lambda row: max(row["M"], row["B + G"], row["gap"]) <= SAME_MECHANICS,
-    note="Largest differences between engine and reference. For M, B + G and Jacobians they are relative to the "
-    "largest entry; for contacts they are absolute. The points of contact, which are not "
-    "judged, can differ where two faces are equally deep.",
+    note="Largest differences between engine and reference: relative to the largest entry for M, B + G and Jacobians, "
+    "absolute for contacts. With other contacts: configurations in which the reference finds other contacts, for "
+    "instance because two faces are equally deep. Only M, B + G and the gap are judged.",
 )  # fmt: skip
 
 
@@ -79,7 +79,11 @@ def _law(study: Study, name: str) -> Row:
             "never gains energy under them": law.never_gains_energy}  # fmt: skip
 
 
-LAW_LIST = Check(key="laws", question="", cases=lambda study: LAWS, row=_law)
+LAW_LIST = Check(
+    key="laws", question="", cases=lambda study: LAWS, row=_law,
+    note="gamma: normal velocities of the contacts; E: diagonal matrix of their e; p: impulses; c: of the compression, "
+    "e: of the rebound. K: Coulomb's friction cone; K*: its dual; u: contact velocities, u_T their tangential parts.",
+)
 
 
 def _world(study: Study, world: str) -> Row:
