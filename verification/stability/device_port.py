@@ -12,7 +12,8 @@ acts as a wall of stiffness K_cpl and damping B_cpl, so b >= K_cpl T/2 + B_cpl i
 controller the tool moves, and the force depends on wall, coordination and the tool's inertia. No such bound is proved
 for this case; K and B are then the wall's constants, and the study measures the b that the loop needs.
 
-The tool does not receive the hand's force, since a force channel needs a sensor; the position channels and F_env act.
+The four-channel coupling works without its channel for the hand's force, which needs a sensor: the position channels
+act, and the channel for F_env.
 
 The study moves the device back and forth by half a millimetre, at several shares of half the sampling rate. The motion
 is either so deep that the coupler always presses, or crosses the surface of the wall, in and out of contact.
@@ -190,11 +191,11 @@ def coupled(ports: Table) -> Part:
         case = row["the hand"], row["sensors"] == "ideal"
         most[case] = max(most.get(case, 0.0), row["needed / bound"])
     return Part.of(
-        "CBuc at a rigid wall: the least device damping that makes it passive, as a multiple of Colgate's bound KT/2 + "
-        "|B| of the coupler", f"{most[PRESSES, True]:.4f} if the hand keeps pressing, with ideal sensors (late or "
-        f"coarse: up to {most[PRESSES, False]:.3g}). Up to {most[CROSSES, True]:.3g} (late or coarse: "
-        f"{most[CROSSES, False]:.3g}) if the hand moves in and out of contact, because the coupler is already "
-        "stretched when it switches on", "at most 1",
+        "CBuc at a rigid wall: the least device damping at which the hand draws no energy, as a multiple of Colgate's "
+        "bound KT/2 + |B| of the coupler", f"ideal sensors: {most[PRESSES, True]:.4f} if the hand keeps pressing, "
+        f"{most[CROSSES, True]:.3g} if it moves in and out of contact, because the coupler is already stretched when "
+        f"it switches on. Late or coarse sensors: up to {most[PRESSES, False]:.3g} and {most[CROSSES, False]:.3g}",
+        "at most 1",
         MIXED if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
 
 
@@ -203,11 +204,11 @@ def coordinated(ports: Table) -> Part:
     found = ports.only(world != COUPLER_WORLD for world in ports["world"])
     needed, sums = found["damping needed"], found["with the coordination's gains"]
     return Part.of(
-        "Four-channel coupling at a wall of springs: the least device damping that makes it passive, as a multiple of "
-        "Colgate's bound for the wall alone", f"up to {max(found['needed / bound']):.3g}: the device needs "
-        f"{min(needed):.3g} to {max(needed):.3g} N s/m, because the hand also feels the coupling's "
-        f"{COORDINATION[1]:g} N s/m. As a multiple of the bound for wall and coupling together: up to "
-        f"{max(map(truediv, needed, sums)):.3g}", "at most 1, which is proved for CBuc only",
+        "Four-channel coupling at a wall of springs: the least device damping at which the hand draws no energy, as a "
+        "multiple of Colgate's bound for the wall alone", f"up to {max(found['needed / bound']):.3g}: the device "
+        f"needs {min(needed):.3g} to {max(needed):.3g} N s/m, because the hand also feels the coupling's damping of "
+        f"{COORDINATION[1]:g} N s/m. Up to {max(map(truediv, needed, sums)):.3g} times the bound for wall and coupling "
+        "together", "at most 1, which is proved for CBuc only",
         MIXED)
 
 
@@ -227,7 +228,7 @@ PORT = Check(
     says=lambda table: (coupled(table), coordinated(table)),
     note="The complete device loop at 512 Hz; the worst of several speeds of the hand. The hand moves by ±0.5 mm: "
     "it always presses, or it crosses the surface. Late: readings and forces each come one step late; coarse: "
-    "readings rounded to 10 µm. Stiffness and damping are those of the coupler in CBuc, else of the wall; the "
-    "four-channel coupling has the gains of the paper's Table I. Leak: energy that the hand draws from the loop at "
-    "b = KT/2 + |B|.",
+    "readings rounded to 10 µm. Stiffness and damping are those of the coupler in CBuc, else of the wall. The "
+    "four-channel coupling has the gains of Table I, but no channel for the hand's force: the motion of the hand is "
+    "given. Leak: energy that the hand draws from the loop at b = KT/2 + |B|.",
 )

@@ -56,13 +56,12 @@ def _of_maps(table: Table) -> Iterator[Part]:
     damped, bare = ideal & (b > 0.0), ideal & (b == 0.0)
     gains = int((passive & (theirs == GROWS))[damped].sum())
     yield Part.of(
-        "Walls that Colgate's condition calls passive, but at which the mass moves ever more (penalties, ideal "
-        "sensors, device with damping)",
-        f"{gains or 'none'} of {passive[damped].sum()}. Of the walls at which the condition fails, "
-        f"{(~passive & (theirs == SETTLES))[damped].sum()} are stable, too: it is for the worst hand, ours is a "
-        "constant force", "none",
+        "Walls that are passive by Colgate's condition, but at which the motion grows (penalties, ideal sensors, "
+        "device with damping)",
+        f"{gains or 'none'} of {passive[damped].sum()}. {(~passive & (theirs == SETTLES))[damped].sum()} more walls "
+        "are stable although the condition fails: it covers the worst hand, ours is a constant force", "none",
         REFUTED if gains else REPRODUCED)
-    shares = " and ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % at {one:.0f} Hz"
+    shares = " and ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % of the walls at {one:.0f} Hz"
                           for one in dict.fromkeys(rate[bare].tolist()))
     yield Part.of(
         "Walls that are passive on a device without damping (b = 0, as in the paper), with penalties and ideal "
@@ -82,7 +81,7 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
         f"loops of given rate, sensor and device damping), {ours.sum()} are stable with impulses and {theirs.sum()} "
         f"without. With impulses, each loop has {min(more):.2f} to {max(more):.2f} times as many stable walls. {only}.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
-        asked="Stable walls with impulses, and without", target="more with impulses, and none lost",
+        asked="Number of stable walls with impulses, and without", target="more with impulses, none only without",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
         miss=f"of {theirs.size:,} walls {lost} are stable only without impulses ({there or 'none'} of them at the "
              f"paper's damping), and {int((ours & ~theirs).sum())} only with impulses"
@@ -114,15 +113,15 @@ def _hard(table: Table) -> Part:
     return Part.of(
         "First rise of the force (rate-hardness) and penetration with impulses, relative to penalties, at the paper's "
         f"wall damping of {PAPER_DAMPING:g} N s/m",
-        f"{min(harder):.3g} to {max(harder):.3g} times as hard (median over stiffnesses), {min(deeper):.2f} to "
-        f"{max(deeper):.2f} times as deep", "harder, no deeper",
+        f"{min(harder):.3g} to {max(harder):.3g} times as hard, {min(deeper):.2f} to {max(deeper):.2f} times as deep "
+        "(range over the loops of the median over stiffnesses)", "harder, no deeper",
         REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)
 
 
 MAPS = Check(
     key="maps", question="At which walls does the mass come to rest?", cases=lambda study: loops(), row=_marks,
-    says=_of_maps, digits=3, note="One mark per damping, from small to large: + the mass settles, o it keeps bouncing, "
-    "x its motion grows.",
+    says=_of_maps, digits=3, note="Last two columns: one mark per wall damping, from small to large: + the mass comes "
+    "to rest, o it keeps bouncing, x its motion grows.",
 )
 DAMPINGS = Check(
     key="dampings", question="Which dampings do the maps have?", cases=lambda study: grid(study.depth)[1],
@@ -132,18 +131,18 @@ HARDNESS = Check(
     key="hardness", question="How hard does a wall feel?", cases=lambda study: loops(), row=_hardness, says=_hard,
     digits=3, note="Wall damping 50 N s/m, as in the paper. Rate-hardness: the rise of the force per second over the "
     "first step of contact, divided by the approach speed (Lawrence and others, 2000). An impulse is given in one "
-    "step, so its rate-hardness grows with the square of the rate; a device with limited force cannot show all of it.",
+    "step, so its rate-hardness grows with the square of the rate. A device with limited force renders part of it.",
 )
 
 contact_stability = Topic(
     key="stability", title="Stability of contact",
     question="A virtual wall in a sampled loop can feed energy to the hand. First, a constant force pushes a mass of 2 "
-    "kg against many walls; a wall is a pair of stiffness K and damping B in one loop. The loop samples at 512 Hz or 1 "
-    "kHz, and the motion between samples is exact. “Late” sensors: readings, rounded to 1 µm, and forces each come one "
-    "step late. A wall is stable if the mass comes to rest: in the last quarter of three seconds it is slower than 1 "
-    "mm/s and never leaves the wall. Then the paper's peg moves into its corner in the engine's own loop. Colgate's "
-    "condition, b >= KT/2 + |B| with the device's damping b and the period T, makes a wall passive for every hand, if "
-    "sensors are ideal and the wall is a spring and damper.",
+    "kg against many walls of stiffness K and damping B. A loop has a rate (512 Hz or 1 kHz), a device damping b, and "
+    "ideal or late sensors: late readings are rounded to 1 µm, and readings and forces each come one step late. A wall "
+    "is stable if the mass comes to rest: in the last quarter of three seconds the mass is slower than 1 mm/s and "
+    "never leaves the wall. Second, the engine pushes the paper's peg into a corner. Third, a hand moves the device, "
+    "and we measure the energy that it draws from the loop. Colgate's condition, b >= KT/2 + |B| with the period T, "
+    "makes a wall of spring and damper passive for every hand, if the sensors are ideal.",
     checks=(MAPS, DAMPINGS, HARDNESS, PEG, PORT),
     says=lambda tables, parts: parts[0].sentence if "maps" in tables else "",
 )
