@@ -218,8 +218,9 @@ def _of_part(words: Mapping[str, str], name: str) -> str:
 
 
 def _spans(table: Table, keys: Iterable[str]) -> str:
-    """Return the smallest and largest value of each column in words."""
-    found = {key: [value for value in table[key] if value is not None] for key in keys}
+    """Return the smallest and largest value of each column in words, with its unit."""
+    titles = {column.key: column.title for column in table.columns}
+    found = {titles[key]: [value for value in table[key] if value is not None] for key in keys}
     return "".join(f" {key[:1].upper()}{key[1:]}: {_short(min(values))} to {_short(max(values))}."
                    for key, values in found.items() if values)  # fmt: skip
 

@@ -52,8 +52,8 @@ Pairs = list[tuple[Mechanism, PinocchioMechanism]]
 Pair = tuple[Any, Any]  # a quantity of ours, and of the reference
 
 TOLERANCE = (
-    f"{AGREEMENT:g} of the reference's largest entry, for two algorithms that are each accurate to about 1e-14. A bias "
-    "or potential energy that nearly vanishes is compared with the size of the terms in its sum"
+    f"{AGREEMENT:g} of the reference's largest entry; each algorithm is accurate to about 1e-14. A potential energy or "
+    "bias (Coriolis and centripetal forces) that nearly vanishes is compared with the size of the terms in its sum"
 )
 TREES_SET, OTHERS = "random trees", "robots beside the checkout"
 _SETS = {
@@ -239,8 +239,8 @@ def agreement(table: Table) -> Iterator[Part]:
     for name, words in _SETS.items():
         found = table.where(set=name)
         if not found.rows:
-            yield Part(f"Robots of other projects are not compared: {ROBOTS.name}/ has no URDF files.", NOT_TESTABLE,
-                       optional=True)
+            yield Part(f"Robots of other projects are not compared: the optional folder {ROBOTS.name}/ beside the "
+                       "project has no URDF files.", NOT_TESTABLE, optional=True)
             continue
         yield Part.of(
             f"{words}: largest difference from Pinocchio in {sum(found['states']):,} random states",
@@ -273,18 +273,16 @@ def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
         error = float(np.linalg.norm(L.T @ difference) / np.linalg.norm(L.T @ v))
         shares.append(error / (100.0 * d * EPS * condition**2))
         easy += [error] if condition <= _EASY else []
-    yield {"quantity": "v⁺ of independent rows, as a share of 100 d ε κ(A)²", "cases": len(shares),
+    yield {"quantity": "v⁺ of independent rows, as a share of 100 d ε κ(W)", "cases": len(shares),
            "largest difference": max(shares), "tolerance": 1.0,
-           "why this tolerance": "a hundred roundings per coordinate, times κ(A)², the condition number of the "
-           "Delassus matrix"}  # fmt: skip
-    yield {"quantity": "v⁺ where κ(A) ≤ 10, kinetic metric", "cases": len(easy), "largest difference": max(easy),
+           "why this tolerance": "a hundred roundings per coordinate, times the condition number of W"}  # fmt: skip
+    yield {"quantity": "v⁺ where κ(W) ≤ 100, relative to |v⁻|", "cases": len(easy), "largest difference": max(easy),
            "tolerance": 1e-12, "why this tolerance": "plain rounding"}  # fmt: skip
 
 
 IMPULSE_DYNAMICS = Check(
-    key="impulse dynamics", question="Impacts at independent contacts agree with Pinocchio's impulseDynamics.",
+    key="impulse dynamics", question="Velocities after impacts at independent contacts agree with Pinocchio's.",
     cases=lambda _: (2000,), row=_impulse_dynamics, prose=("why this tolerance",), digits=2,
-    spans=("cases", "largest difference"),
     holds=lambda row: bool(row["largest difference"] <= row["tolerance"]),
 )  # fmt: skip
 

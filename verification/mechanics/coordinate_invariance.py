@@ -173,9 +173,10 @@ def holds(row: Row) -> bool | None:
 
 
 COORDINATES = Check(
-    key="coordinate invariance", question="An impact has one outcome, whatever the coordinates it is solved in.",
+    key="coordinate invariance", question="An impact solved in other coordinates has the same outcome, up to rounding.",
     cases=_cases, row=_row, holds=holds, parts=("coordinates",), spans=("error",),
-    note=f"See claim C06. The tolerance is {AGREEMENT:g} of the velocity in the kinetic metric, if κ(M) and κ(∂f/∂r)² "
-    f"are at most {MODERATE:g} and each row is exactly redundant or well separated (σ_min ≥ {SEPARATED:g}). Otherwise "
-    f"it is {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min; a tolerance above 1 means that nothing is tested.",
+    note=f"See claim C06. The joint angles are q = f(r) of the other coordinates r; σ_min is the least nonzero "
+    f"singular value of the unit rows in the kinetic metric. Bound: {CONSTANT:g} d ε κ(M) κ(∂f/∂r)² / σ_min. Tolerance "
+    f"{AGREEMENT:g} if κ(M) and κ(∂f/∂r)² are at most {MODERATE:g} and σ_min is at least {SEPARATED:g}, otherwise "
+    "the bound. Error, bound and tolerance are relative to |v⁻|; a tolerance of 1 or more tests nothing.",
 )  # fmt: skip

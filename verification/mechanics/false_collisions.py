@@ -114,9 +114,9 @@ def filters(table: Table) -> Part:
     both = table.where(filters="both filters")
     left = [f"{row['damping']:g}" for row in both.records() if row["false collisions"]]
     return Part.of(
-        "C18: false collisions of a ball that rolls in the faceted socket. The contact damping is "
-        f"{', '.join(f'{b:g}' for b in both['damping'])} N s/m; the filter distances exceed the "
-        f"{1e3 * edge_jump():.1f} mm between contacts on neighbouring facets", f"for these dampings: {counts}",
+        "C18: number of false collisions of a ball that rolls in a faceted socket, at contact dampings of "
+        f"{', '.join(f'{b:g}' for b in both['damping'])} N s/m. The distances of both filters exceed the "
+        f"{1e3 * edge_jump():.1f} mm between contacts on neighbouring facets", f"at these dampings: {counts}",
         "none with both filters",
         REFUTED if len(left) == len(both.rows) else MIXED if left else REPRODUCED,
         miss=f"at a wall damping of {', '.join(left)} N s/m, a ball that rolls over flat facets gets false impulses "
@@ -127,6 +127,6 @@ IN_TIME = Check(key="false collisions in time", question="When do the false coll
                 row=_times)  # fmt: skip
 FALSE_COLLISIONS = Check(
     key="false collisions", question="Do the filters remove false collisions?", cases=_cases, row=_counts, says=filters,
-    digits=3, note="The ball rolls for two seconds. In the round socket it has one contact in each step and no "
-                   "collision after the first.",
+    digits=3, note="The ball rolls for two seconds. In a round socket it would have one contact in each step and no "
+                   "collision after the first. Doubled contacts: those beyond one per step.",
 )  # fmt: skip

@@ -130,15 +130,16 @@ def findings(table: Table) -> Iterator[Part]:
     relative = table.only(treatment != PER_BODY for treatment in table["treatment"])
     energy, momentum = max(map(abs, relative["energy change"])), max(relative["momentum change"])
     yield Part.of(
-        "Newton's cradles of 2 to 7 balls and Bernoulli's three balls with relative rows (12), solved all at once or "
-        "one contact after the other", f"energy changes by at most {energy:.1e}, momentum by at most {momentum:.1e}",
-        f"at most {CONSERVED:g}", REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
+        "Newton's cradles of 2 to 7 balls, and a ball that strikes two touching ones (Bernoulli), with relative rows "
+        "(12), solved all at once or one contact after the other", f"energy changes by at most {energy:.1e} of its "
+        f"value, momentum by at most {momentum:.1e}", f"at most {CONSERVED:g}",
+        REPRODUCED if max(energy, momentum) <= CONSERVED else REFUTED)  # fmt: skip
     per_body = table.where(treatment=PER_BODY)
     energy, least = max(map(abs, per_body["energy change"])), min(per_body["momentum change"])
     yield Part.of(
         "The same balls with the paper's per-body rows (13)-(14)",
-        f"energy changes by at most {energy:.1e}, but momentum always by at least {least:.2g} times its value, because "
-        "the striking ball rebounds as from a wall", "momentum changes (number 3 of our errata of the paper)",
+        f"energy changes by at most {energy:.1e} of its value. Momentum always changes by at least {least:.2g} times "
+        "its value: the striking ball rebounds as from a wall", "momentum changes (number 3 of our errata)",
         REPRODUCED if energy <= CONSERVED < least else REFUTED)  # fmt: skip
     if five := table.where(problem="cradle of 5").records():
         yield _rows_decide(five)
@@ -146,8 +147,8 @@ def findings(table: Table) -> Iterator[Part]:
 
 def _rows_decide(five: Sequence[Row]) -> Part:
     """Return the part on the cradle of five: three choices of rows conserve energy and momentum, but differ."""
-    choices = {"all touching rows": (RELATIVE, ALL), "the approaching row": (RELATIVE, APPROACHING),
-               "one after the other": (SEQUENTIAL, "one after the other along the row")}  # fmt: skip
+    choices = {"rows of all touching contacts": (RELATIVE, ALL), "row of the approaching one": (RELATIVE, APPROACHING),
+               "one contact after the other": (SEQUENTIAL, "one after the other along the row")}  # fmt: skip
     after = {name: np.array([row["v_x after"] for row in five if (row["treatment"], row["rows or order"]) == choice])
              for name, choice in choices.items()}  # fmt: skip
     words = "; ".join(f"{name} ({', '.join(f'{round(v, 1) + 0.0:.1f}' for v in values)})"
@@ -155,13 +156,14 @@ def _rows_decide(five: Sequence[Row]) -> Part:
     apart = min(float(np.abs(a - b).max()) for a, b in combinations(after.values(), 2))
     return Part.of(
         "Conservation laws do not determine the outcome; the choice of contacts that enter the impact does",
-        f"velocities of five balls after the impact: {words} m/s. The paper uses the contacts that approach. Only "
-        "solving the contacts one after the other passes the impulse to the last ball", "outcomes that differ",
+        f"velocities [m/s] of a cradle of five balls after the impact: {words}. The paper uses the contacts that "
+        "approach. Only one contact after the other gives the last ball all momentum", "outcomes that differ",
         REPRODUCED if apart > CONSERVED else REFUTED)  # fmt: skip
 
 
 LINKED_IMPACTS = Check(
     key="linked impacts", question="What do touching balls do in an elastic impact?",
     cases=lambda _: (*(cradle(n) for n in range(2, 8)), bernoulli()), row=_rows, says=findings,
-    note="Elastic impacts of equal frictionless balls. Changes are relative to the energy or momentum before.",
+    note="Elastic impacts of equal frictionless balls; the order names the contacts that close first. Changes are "
+    "relative to the energy or momentum before.",
 )  # fmt: skip

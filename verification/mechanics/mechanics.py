@@ -23,10 +23,10 @@ def _answer(tables: Mapping[str, Table], _: Sequence[Part]) -> str:
     worst, balls = max(tables[AGAINST_PINOCCHIO.key]["worst"], default=0.0), tables[LINKED_IMPACTS.key]
     lost = min(balls.where(treatment=PER_BODY)["momentum change"])
     return (f"Mass matrices, forces and Jacobians differ from Pinocchio's by at most {worst:.1e} of the largest "
-            "entry. By (13)-(14), each of two touching bodies has its own impulse; impacts of a ball on resting balls "
-            f"then change the total momentum by at least {lost:.2g} times its value: the ball rebounds as from a wall. "
-            "A ball rolls over flat facets without false collisions if it stays on the surface and the coherence "
-            "distance exceeds the distance between the contacts on neighbouring facets.")
+            "entry. With (13)-(14), a separate impulse for each of two touching bodies, impacts of a ball on resting "
+            f"balls change the total momentum by at least {lost:.2g} times its value: the ball rebounds as from a "
+            "wall. A ball rolls over flat facets without false collisions only if it stays on the surface and the "
+            "coherence distance exceeds the distance between the contacts on neighbouring facets.")
 
 
 mechanics = Topic(

@@ -157,7 +157,8 @@ def holds(found: dict[str, Any]) -> bool:
 OPERATING = Check(
     key="operating", cases=_cases, row=_row, spans=("steps near singular", "largest joint speed"),
     question="Led by any point of any link, the arm passes its singular poses with finite motion and bounded energy.",
-    note="Tolerance: every number is finite. The energy residual, relative to the energy exchanged, is at most the "
-    "largest joint rotation per step [rad], which is the error of a first-order method. Arm and spring store at most "
-    "that much more energy than the hand has put in.",
+    note="A row holds if every number is finite and two errors are at most the tolerance, the largest joint rotation "
+    "per step [rad]: the residual of the energy balance, relative to the sum of the hand's |work| over all steps, and "
+    "the energy that arm and spring store beyond what the hand has put in. Near singular: σ_min/σ_max of the hand's "
+    f"Jacobian is at most {SINGULAR:g}.",
 )  # fmt: skip

@@ -113,13 +113,15 @@ def _definite(study: Study, joints: int) -> Row:
 
 
 POWER_BALANCE = Check(
-    key="power balance", question="Energy changes by the work of the generalized forces, to the order of the "
-    "integrator.", cases=lambda _: product(METHODS, SIZES), row=_row, holds=as_declared, spans=("median order",),
-    note=f"Tolerance: median order within {ORDER_TOLERANCE} of the declared order.",
+    key="power balance", question="Energy changes by the work of the generalized forces, up to a defect with the "
+    "order of the integrator.", cases=lambda _: product(METHODS, SIZES), row=_row, holds=as_declared,
+    spans=("median order",), note="Defect: energy that a step creates or loses. Tolerance: median order within "
+    f"{ORDER_TOLERANCE} of the declared order.",
 )  # fmt: skip
 POSITIVE_DEFINITE = Check(
     key="positive definite", question="The mass matrix is positive definite wherever rounding permits a judgement.",
     cases=lambda _: SIZES, row=_definite, spans=("largest condition judged", "least eigenvalue × condition"),
     holds=lambda row: bool(row["least eigenvalue × condition"] > 0.0),
-    note=f"Tolerance: least eigenvalue above zero where the scaled condition is at most {LARGEST_CONDITION:g}.",
+    note="Condition and eigenvalue are those of M scaled to a unit diagonal. A row holds if all judged eigenvalues are "
+    f"positive. Above a condition of {LARGEST_CONDITION:g} rounding decides the sign, so the matrix is not judged.",
 )  # fmt: skip

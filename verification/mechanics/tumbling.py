@@ -210,5 +210,5 @@ TUMBLING = Check(
     "declares; its energy and angular momentum converge at least as fast.",
     cases=lambda _: product(MOTIONS, INTEGRATORS), row=_rows,
     note=f"Tolerance: order within {ORDER_TOLERANCE} of the declared one, measured at the two finest steps with errors "
-         "above rounding.",
+         "above rounding. Only the row of this order decides; the others cannot tell.",
 )  # fmt: skip
