@@ -10,8 +10,6 @@ the same e, then for *any* gamma_minus:
 3. IAPB never keeps more energy than the LCP: loss_eq − loss_LCP = ½ (1−e)/(1+e) · distance². At e = 1 neither loses
    energy.
 
-`map_rows` sums up the agreement by geometry, restitution and redundancy; `TWO_CONTACTS` tests two contacts.
-
 Let two contacts have unit rows with the cosine c in the kinetic metric and approach at speeds 1 and r <= 1. Both
 impulses of IAPB push if and only if r >= c, because W⁻¹ (1, r) is proportional to (1 − c r, r − c). If r < c, the
 slower contact pulls. Neither the restitution nor any other component of the velocity matters.

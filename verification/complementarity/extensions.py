@@ -1,12 +1,7 @@
 """Compare IAPB's extensions with complementarity: friction in the impact, and unequal restitution.
 
-Friction: the engine's law (`resolve_frictional_impact`) is compared with Coulomb's law as a nonlinear complementarity
-problem (NCP) and with the convex relaxation of this problem (CCP). If all contacts push and the engine did not reduce
-friction, the engine and the NCP give the same velocity. With e > 0 the NCP can gain energy; the engine cannot.
-
-Unequal restitution: the engine and the reference solve the two LCPs of Poisson's law with independent solvers. Two
-other laws are compared: the Newton LCP, which can gain energy if some contacts separate, and plain equalities, which
-can gain energy even if all contacts approach.
+Friction: the engine's law (`resolve_frictional_impact`) is compared with Coulomb's law (NCP) and its convex relaxation
+(CCP). Unequal restitution: the engine and the reference solve the two LCPs of Poisson's law with independent solvers.
 """
 
 from __future__ import annotations

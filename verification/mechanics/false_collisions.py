@@ -1,8 +1,4 @@
-"""C18: false collisions of a ball that rolls in a faceted socket, with and without the two filters.
-
-The facets approximate a round socket, in which the ball would collide only once. Every collision after the first
-contact is therefore false, and every contact beyond one per step is a duplicate.
-"""
+"""C18: false collisions of a ball that rolls in a faceted socket: those after the first, as in a round socket."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Topic: linkages and free bodies, compared with Pinocchio, closed forms and conservation laws.
-
-Timing (`verification.cost.robots`) is part of another topic, because its results depend on the machine.
-"""
+"""Topic: linkages and free bodies, compared with Pinocchio, closed forms and conservation laws."""
 
 from __future__ import annotations
 
