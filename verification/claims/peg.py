@@ -258,7 +258,7 @@ C11 = peg_claim(
     quantity="F is the force of the device's actuators. Three quantities: its peak in the run; mean of |F + F_hand| "
     "over the steps in contact without an impact; mean of |F − F_ideal| over all steps from the first contact to rest, "
     "where F and F_ideal are averaged over the last 16 steps, so that the step in which an impulse acts hardly "
-    "matters. Beyond the paper: larger collision thresholds. No start has friction.", note="x, y in N; rotation in N m.",
+    "matters. Beyond the paper: larger collision thresholds. No friction.", note="x, y in N; rotation in N m.",
     tolerance="Peak: larger than PB's. Distance from balance: smaller than PB's. Distance to ideal: the smallest. A "
     "trial cannot tell if all are below 1e-9, or if the distances of IAPB and of the nearer of PB and CBuc differ by "
     "less than 0.004 N in x, 0.006 N in y, 4.5e-4 N m in rotation; a shorter time step of ideal changes them by less.",

@@ -183,7 +183,7 @@ def printed_formula() -> Finding:
     exact = exact_impact(case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution).rounded_velocity
     sentence = (
         f"With {case.contacts} rows, {case.coordinates} coordinates and e = {case.restitution:g}, formula (21) as "
-        f"printed adds {gain:.2g} of the kinetic energy (computed exactly). Asked for {COUNTER_IMPACTS} random impacts, "
+        f"printed adds {gain:.2g} of the kinetic energy (computed exactly). Asked for {COUNTER_IMPACTS} impacts, "
         f"check_passivity tested this law on {verdict.checked:,}, with difficult ones and those of other laws. "
         f"{verdict.failures} of them gained energy, at most {verdict.largest:.2g} of the energy before."
     )
