@@ -20,31 +20,38 @@ from matplotlib.transforms import Bbox
 from iapb.scene import find_scene, load_scene, scene_names
 from iapb.system import System
 from reports.evidence.runs import TILTED
-from reports.figures import RECIPES, energy_gains, mechanics, plot
+from reports.figures import RECIPES, energy_gains, plot
 from reports.figures.condition_map import condition_map
 from reports.figures.corner import UNLIMITED
 from reports.figures.figure import draw, standalone
 from reports.figures.geometry import body_placements, is_spatial, solids
 from reports.figures.labels import arrow_of_time, label_marks, name_curves
+from reports.figures.mechanics import BERNOULLI, CRADLE, outcomes
 from reports.figures.numbers import format_number
 from reports.figures.paper import arm_energies
 from reports.figures.plot import Plot
 from reports.figures.style import CYCLE, LOOKS, STYLES, VARIABLES
 from tests.reports.made_up import made_motion
+from verification.check import Study
+from verification.complementarity.agreement import TWO_CONTACTS
 from verification.cost.accuracy import WAYS
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
 from verification.cost.trajectories import BELOW, INTEGRATORS, OK, TIMED_OUT, WORLDS
+from verification.mechanics import linked_impacts
+from verification.mechanics.mechanics import mechanics
+from verification.stability.topic import contact_stability
 from verification.table import titled
 
 MOST_SERIES = 6
 OF_WORLDS = {(look.color, look.marker): names for names, look in LOOKS[:7] if look.marker}
 SCENES = tuple(f"scene {k}" for k in range(6))
+CHECKS = {"mechanics": mechanics.checks, "stability": contact_stability.checks, "complementarity": [TWO_CONTACTS]}
 METHODS = tuple(dict.fromkeys((*WORLDS, *INTEGRATORS)))
 
 
 def tables():
-    """Return a table for each input of a figure that is a table."""
+    """Return a made-up table for each input of a figure that is a table and takes long to compute."""
     made = {
         "C22/C22": ("problem; contacts; ratio; lower quartile; upper quartile", (
             (problem, c, r, 0.97 * r, 1.03 * r) for problem, power in (("a patch", 0.9), ("a pile", -0.05))
@@ -53,8 +60,6 @@ def tables():
             "impacts; e; redundant rows; share that agrees; median distance where they differ; largest distance", (
                 (family, e, k, 1.0 - 0.2 * k, 0.3 * k * (1 + e) or None, 0.5 * k * (1 + e))
                 for family in ("one contact", "corner") for k in (0, 2) for e in (0.0, 0.5, 1.0))),
-        "complementarity/two contacts": ("cosine; speed ratio; agreement predicted; agreement found", (
-            (0.1 * k, 0.1 * m, m >= k, m >= k) for k in range(-9, 10, 3) for m in range(1, 11, 3))),
         "complementarity/piles": (
             "rows; contacts; share that agrees; most contacts that agree; share of impulses that pull; "
             "pushing from the LCP; time of (21) [µs]; time of pushing [µs]", (
@@ -96,32 +101,6 @@ def tables():
                  f"position {BELOW}" if (h, k) == (0.5, 2) else "")
                 for m, scene in enumerate(SCENES) for k, method in enumerate(METHODS)
                 for h in (8.0, 2.0, 0.5, 0.1, 0.02))),
-        "mechanics/coordinate invariance": ("coordinates; contacts; elbow [rad]; error; bound", (
-            (name, contacts, elbow, None if bound > 1e8 else 1e-3 * bound, bound)
-            for name, power in (("absolute angles", 0), ("place of the hand", -2))
-            for contacts in ("one", "two, separated", "two, 1e-08 m apart") for elbow in (1.0, 1e-2, 1e-4, 1e-8, 0.0)
-            for bound in [1e-11 * max(elbow, 1e-12) ** power])),
-        "mechanics/tumbling": (
-            "motion; integrator; step [s]; attitude error [rad]; energy drift [relative]; momentum drift [relative]; "
-            "declared order", (
-                ("turning over", integrator, h, h**order, 0.1 * h**order, 0.01 * h**order, order)
-                for integrator, order in zip(mechanics.INTEGRATORS, (4, 1, 2, 2), strict=True)
-                for h in (0.01, 0.005))),
-        "mechanics/false collisions": ("filters; damping [N s/m]; false collisions", (
-            (name, b, 20 - 6 * k) for k, name in enumerate(mechanics.FILTERS) for b in (10.0, 40.0, 60.0))),
-        "mechanics/false collisions in time": (
-            "filters; damping [N s/m]; time [s]; false collisions so far; energy lost so far, share of the fall", (
-                (name, 40.0, 0.1 * n, n, 0.04 * n / (k + 1)) for k, name in enumerate(mechanics.FILTERS)
-                if k < 3 for n in range(1, 18 - 5 * k))),
-        "mechanics/linked impacts": (
-            "problem; treatment; rows or order; ball; v_x after [m/s]; v_y after [m/s]; energy change; "
-            "momentum change", (
-                (problem, treatment, rows, ball, 0.2 * ball + 0.1 * k, 0.1 * (balls == 3), 0.0, -2.0 * (k == 1))
-                for problem, balls in (("cradle of 2", 2), ("cradle of 5", 5), ("Bernoulli", 3))
-                for k, (treatment, rows) in enumerate((
-                    ("simultaneous, relative rows (12)", "all touching contacts"),
-                    ("simultaneous, per-body rows (13)-(14)", "approaching contacts"),
-                    ("event-driven", "contact 0, then 1"))) for ball in range(balls))),
         "scene-ledger/books over time": (
             "scene; time [s]; kinetic [J]; potential [J]; springs [J]; given [J]; lost impacts [J]; lost damping [J]; "
             "lost friction [J]; impacts", (
@@ -130,16 +109,6 @@ def tables():
                 for k, scene in enumerate(SCENES) for n in range(20))),
         "scene-ledger/contact": ("scene; dimensions; most penetration [mm]; how it ends; energy exchanged [J]", (
             (scene, 2 + k % 2, 0.3 * k, "keeps moving", 0.1 * k) for k, scene in enumerate(SCENES))),
-        "stability/dampings": ("damping [N s/m]", ((b,) for b in (0.0, 1.0, 10.0, 100.0, 1000.0))),
-        "stability/maps": (
-            "rate [Hz]; sensors; device damping [N s/m]; stiffness [N/m]; passive up to [N s/m]; penalties; impulses", (
-                (512.0, "ideal", b, K, max(b - K / 1024, 0.0), "xo+ox", "oo++x") for b in (0.0, 5.0)
-                for K in (100.0, 1e3, 1e4))),
-        "stability/hardness": (
-            "rate [Hz]; sensors; device damping [N s/m]; law; stiffness [N/m]; rate-hardness [N/m]; settles after [s]; "
-            "penetration [mm]", (
-                (512.0, "ideal", 0.0, law, K, 26.0 * K if k else 26000.0, 100 / K if K < 1e5 else None, 1e3 / K)
-                for k, law in enumerate(("impulses", "penalty")) for K in (100.0, 1e3, 1e4, 1e5))),
         "work_precision": (
             "contacts; coordinates; problem; method; work; called; time [µs]; quartiles [µs]; relative error; "
             "relative energy gain; restitution residual; failed after [µs]; outcome", precision_rows()),
@@ -156,7 +125,7 @@ def precision_rows():
 
 
 def all_inputs():
-    """Return the inputs of all figures but those of scenes in space and of some films: made-up motions and tables."""
+    """Return the inputs of all figures but those of scenes in space and some films: made up, or computed in a moment."""
     needed = sorted({name for recipe in RECIPES for name in recipe.needs})
     scenes = {"corner": "peg_corner", "device": "peg_corner", "hole": "peg_hole", "group": "arm_pushing",
               "wall": "wall_1d"}
@@ -164,7 +133,9 @@ def all_inputs():
             if name.split("/")[0] in scenes}  # fmt: skip
     given = {name: load_scene(find_scene(name[6:])).resolved() for name in needed if name.startswith("scene/")}
     tilted = {tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015)}
-    return {**runs, **given, **tables(), TILTED: tilted, "arm_energies": arm_energies(),
+    study, checks = Study(), {f"{topic}/{check.key}": check for topic, checks in CHECKS.items() for check in checks}
+    computed = {name: checks[name].table(study) for name in needed if name in checks}
+    return {**runs, **given, **tables(), **computed, TILTED: tilted, "arm_energies": arm_energies(),
             "machine": "a processor, report of today"}
 
 
@@ -309,6 +280,15 @@ def test_figure_3_has_the_energies_that_follow_from_the_geometry():
         for contact in "AB":  # the loss is proportional to 1 - e²
             lost = before - table[f"{reading}, {contact}"]
             np.testing.assert_allclose(lost, share * lost[0], atol=1e-13)
+
+
+@pytest.mark.parametrize(("problem", "balls"), [
+    (CRADLE, linked_impacts.cradle()), (BERNOULLI, linked_impacts.bernoulli())])  # fmt: skip
+def test_a_figure_reads_the_outcomes_of_linked_impacts_as_they_were_computed(problem, balls, gallery):
+    read = outcomes(gallery.inputs["mechanics/linked impacts"], problem)
+    for ours, (treatment, rows, velocity) in zip(read, linked_impacts.outcomes(balls), strict=True):
+        assert (ours.treatment, ours.rows) == (treatment, rows)
+        np.testing.assert_array_equal(ours.velocity, velocity)
 
 
 def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes():
