@@ -119,27 +119,15 @@ def _command(words):
 
 
 def _apply_diff(path, text):
-    """Insert the lines with "+" beside those with " ", each of which must be in the file exactly once."""
-    lines, waiting, place = path.read_text(encoding="utf-8").splitlines(), [], None
-    for line in text.splitlines():
-        sign, content = line[:1], line[1:]
-        if line.strip() in ("…", ""):
-            place = None
-        elif sign == "+" and place is None:
-            waiting.append(content)
-        elif sign == "+":
-            lines.insert(place, content)
-            place += 1
-        else:
-            if lines.count(content) != 1:
-                raise ValueError(f"{path} has the line {content!r} {lines.count(content)} times, not once")
-            place = lines.index(content)
-            lines[place:place] = waiting
-            place += len(waiting) + 1
-            waiting = []
-    if waiting:
-        raise ValueError(f"{path}: no line says where {waiting[0]!r} goes")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    """Insert the lines with "+" beside those with " ", which must stand in the file together and once."""
+    whole = "\n" + path.read_text(encoding="utf-8")
+    for part in re.split(r"^…?\n", text, flags=re.M):
+        before, after = ("".join(f"\n{line[1:]}" for line in part.splitlines() if line[0] in signs)
+                         for signs in (" ", "+ "))  # fmt: skip
+        if part and whole.count(f"{before}\n") != 1:
+            raise ValueError(f"{path} has these lines {whole.count(before)} times, not once:{before}")
+        whole = whole.replace(f"{before}\n", f"{after}\n")
+    path.write_text(whole[1:], encoding="utf-8")
 
 
 if __name__ == "__main__":
