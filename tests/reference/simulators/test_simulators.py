@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from iapb.errors import MissingDependencyError
 from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
 from reference.simulators.simulator import damping_for, spring_restitution, viscous_dissipation_for
 from reference.simulators.trajectory import Trajectory, deepest_overlap
@@ -104,10 +104,3 @@ def test_missing_engine_says_how_to_install_it(monkeypatch, name, module):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingDependencyError, match=r"\[peers\]"):
         find_simulator(name).version()
-
-
-def test_names_that_are_not_known_are_told():
-    with pytest.raises(ArgumentError, match="one of iapb"):
-        find_simulator("box2d")
-    with pytest.raises(IapbError, match="elastic_cradle"):
-        fixed_scene("cradle")

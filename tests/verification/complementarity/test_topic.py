@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError
 from reference.complementarity.problem import ImpactProblem
 from reference.datasets import StoredProblem, write_fclib
 from verification.check import Study
@@ -98,8 +97,6 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     assert check.sentences(table)[0].verdict == MIXED and table.holds == (True, True, False)
     shares = profile.table(study).where(kind="frictionless", solver="lemke").column("share solved")
     assert len(shares) == len(FACTORS) and np.all(np.diff(shares) >= 0.0)
-    with pytest.raises(ArgumentError, match="folder"):
-        collections({"nowhere": tmp_path / "nowhere"})[0].table(Study())
 
 
 def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fails() -> None:

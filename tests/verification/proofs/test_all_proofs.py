@@ -5,7 +5,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError
 from verification.proofs import all_proofs, check
 from verification.proofs.numbers import energy_factor, energy_factor_above_cutoff, spring_energy_after
 
@@ -21,11 +20,6 @@ def test_statement_is_proved_and_printed(name: str) -> None:
     for line in (*record.hypotheses, *(row for step in record.steps for row in step.certificate)):
         assert line.words in text and line.text in text
         assert not set(line.latex) & set("ᵀ⁻¹⁺†₀₁₂ₙᵣₑ²αβγδΔκλμσω"), "what latex2mathml would show as text"
-
-
-def test_unknown_name_is_refused() -> None:
-    with pytest.raises(ArgumentError, match="theorem_1"):
-        check("theorem_0")
 
 
 def test_numbers_on_the_pages_of_proofs_are_those_of_doubles_and_of_one_mass_on_its_spring() -> None:
