@@ -69,8 +69,3 @@ def test_a_no_is_always_true(seed, joints):
         assert change <= 1e-10 * size
     if not mechanism.has_velocity_terms:
         assert force <= 1e-10 * size
-
-
-def test_a_mechanism_that_cannot_move_has_an_empty_mass_matrix() -> None:
-    ground = Mechanism([Body("ground", None, Joint("fixed"), mass=1.0)])
-    assert ground.mass_matrix([]).shape == (0, 0) and ground.bias([], []).shape == (0,)

@@ -113,12 +113,6 @@ def test_failures_are_told_apart_by_part_with_their_conditions():
     assert (x.held, x.decided, y.held, y.decided) == (10, 20, 20, 20)
 
 
-def test_trials_that_cannot_tell_are_counted_apart():
-    part = judge_part("x", table([{"tilt [rad]": 0.0}] * 12, [YES] * 10 + [UNKNOWN] * 2))
-    assert (part.verdict, part.held, part.decided, part.unknown) == (REPRODUCED, 10, 10, 2)
-    assert part.sentence == "holds in 10 of 10 trials; 2 more cannot tell."
-
-
 @pytest.mark.parametrize(("held", "failed", "verdict"), [
     (LEAST_DECIDED - 1, 0, NOT_TESTABLE), (LEAST_DECIDED, 0, REPRODUCED), (1, 0, NOT_TESTABLE), (8, 1, MIXED),
     (3, 1, MIXED), (1, 3, REFUTED), (0, 1, REFUTED), (1, LEAST_DECIDED - 1, REFUTED)])  # fmt: skip

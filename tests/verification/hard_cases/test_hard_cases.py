@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -103,14 +102,6 @@ def test_a_call_that_needs_more_memory_than_its_limit_says_so() -> None:
     case = HARD_CASES["ten_thousand_contacts"]()
     with pytest.raises(judge.OutOfMemory, match="more than 1 GiB"):
         judge.bounded_impact(case, "gram_pinv", limit=20.0, most_bytes=1 << 30)
-
-
-def test_a_case_whose_files_are_absent_says_which(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr("verification.hard_cases.shared_problems.FOLDER", tmp_path)
-    with pytest.raises(CaseAbsent, match="bowl.5"):
-        HARD_CASES["bowl_of_low_rank"]()
 
 
 def test_a_bounded_call_gives_the_same_answer() -> None:

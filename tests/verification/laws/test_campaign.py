@@ -43,13 +43,6 @@ def test_every_law_has_its_part_of_the_impacts(part: str, laws: dict[str, object
             assert abs(count - cases / study.ONE_IN) < 5.0 * np.sqrt(cases / study.ONE_IN)
 
 
-def test_a_batch_counts_what_it_has_tried() -> None:
-    outcome = study.do_batch(study.Batch(study.IMPACTS, 0, 40), SUBJECT)
-    counts = {count.law: count for count in outcome.counts}
-    assert counts["kinetic_energy"].checked == counts["arguments"].checked == 40
-    assert not any(count.failures for count in outcome.counts)
-
-
 @pytest.mark.parametrize("index", [41452, 57210])
 def test_a_grazing_cradle_may_lose_an_impulse_below_rounding_in_another_frame(index: int) -> None:
     """Found by the long run: the clamp cuts an impulse of 1e-8 |u| that moves less energy than rounding does."""

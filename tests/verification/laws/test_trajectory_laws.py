@@ -1,13 +1,10 @@
-"""Laws along whole trajectories: random scenes keep them, each planted fault breaks its law, stored runs do as well."""
+"""Laws along whole trajectories: random scenes keep them, each planted fault breaks its law."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from reports.store import read_run, write_run
 from verification.laws.planted import PLANTED_TRAJECTORY_FAULTS, first_occasion
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
 from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory, judge_run
@@ -37,13 +34,6 @@ def test_the_planted_fault_breaks_its_law(law: str, drawn: list[SceneCase]) -> N
     assert run is not None
     residual = TRAJECTORY_LAWS[law].check(Trajectory(run))
     assert residual is not None and not residual.passed
-
-
-def test_a_stored_run_is_judged_from_its_file(drawn: list[SceneCase], tmp_path: Path) -> None:
-    run = drawn[0].simulate()
-    write_run(tmp_path / "run.h5", run)
-    again = dict(judge_run(read_run(tmp_path / "run.h5")))
-    assert again == dict(judge_run(run)) and all(residual.passed for residual in again.values())
 
 
 def test_a_run_of_another_law_is_asked_only_what_holds_for_it() -> None:
