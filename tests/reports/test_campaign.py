@@ -17,6 +17,7 @@ from reports.cli import main
 from reports.counterexamples import ENGINE, CampaignRequest, keep_counterexample, read_counterexample, recheck
 from reports.store import write_run
 from reports.store.tables import read_record, write_record
+from tests.reports.made_up import made_run
 from tests.verification.laws.faults import returns_too_much
 from verification.laws.bounds import LawResidual
 from verification.laws.campaign import IMPACTS, TRAJECTORIES, UNEQUAL, Batch, Found, drawn, plan, residuals
@@ -160,8 +161,8 @@ def test_a_case_that_is_no_impact_is_drawn_again(part, tmp_path):
     assert list(recheck(path)) == [(part, residual)]
 
 
-def test_a_run_is_no_counterexample_and_of_many_the_first_are_kept(tmp_path, make_run, monkeypatch):
-    assert read_counterexample(write_run(tmp_path / "run.h5", make_run())) is None
+def test_a_run_is_no_counterexample_and_of_many_the_first_are_kept(tmp_path, monkeypatch):
+    assert read_counterexample(write_run(tmp_path / "run.h5", made_run())) is None
     monkeypatch.setattr(reports.campaign, "KEPT_PER_LAW", 3)
     campaign, batches = Campaign(tmp_path, BROKEN), [Batch(IMPACTS, 0, 10), Batch(IMPACTS, 10, 10)]
     campaign.run(batches, silent)

@@ -26,7 +26,7 @@ from reports.store.parts import Parts
 from reports.store.runs import store_run
 from reports.store.schema import FORMAT_VERSION, GROUPS, RESULT_GROUPS
 from reports.store.tables import write_record
-from tests.reports.made_up import flipped
+from tests.reports.made_up import flipped, made_run
 from verification.table import titled
 
 SHORT = {"duration": 0.05}
@@ -251,8 +251,8 @@ def test_a_law_of_ones_own_is_made_again_where_a_world_has_it(tmp_path, monkeypa
         repeat_run(path)
 
 
-def test_everything_of_the_content_hash_is_compared(make_run):
-    run, others = make_run(), {}
+def test_everything_of_the_content_hash_is_compared():
+    run, others = made_run(), {}
     for group in RESULT_GROUPS:
         for quantity in GROUPS[group][0]:
             record = getattr(run, group) if group in ("contacts", "impacts") else run
@@ -272,6 +272,6 @@ def test_everything_of_the_content_hash_is_compared(make_run):
     ([np.nan, 1.0], [2.0, 1.0], "by at most inf in 1 of 2 values"),
     ([1.0], [1.0, 1.0], "is float64 (2,), was float64 (1,)"), (None, [1.0], "only simulated again"),
 ])  # fmt: skip
-def test_a_difference_says_how_large_it_is(stored, again, how, make_run):
-    pair = [make_run(energy={} if values is None else {"kinetic": np.array(values)}) for values in (stored, again)]
+def test_a_difference_says_how_large_it_is(stored, again, how):
+    pair = [made_run(energy={} if values is None else {"kinetic": np.array(values)}) for values in (stored, again)]
     assert [(one.name, one.how) for one in differences(*pair)] == [("energy/kinetic", how)]

@@ -174,13 +174,6 @@ def test_a_refusal_names_the_value_and_what_is_expected_and_changes_no_file(stat
                       if path.is_file() and "__pycache__" not in path.parts}  # fmt: skip
 
 
-@pytest.mark.parametrize(("status", "words", "said"), [(1, "run no_such_scene", "no_such_scene"), (2, "run", "scene"),
-                                                       (2, "run peg_corner --speed 3", "No such option")])  # fmt: skip
-def test_with_json_an_error_is_an_object_too(status, words, said, answer):
-    ended, found = answer(*words.split())
-    assert ended == found["status"] == status and said in found["error"]
-
-
 JSON = {  # of each row in the documents: the status, and a command
     "run": (0, "run peg_corner --set duration=0.4 --out runs"),
     "check": (3, "check peg_corner --set contact.stiffness=1e9"), "effects": (0, "effects peg_corner --world ideal"),
@@ -192,7 +185,7 @@ JSON = {  # of each row in the documents: the status, and a command
 }  # fmt: skip
 
 
-def test_json_has_the_keys_that_the_documents_list(answer, here):
+def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too(answer, here):
     found = {}
     for row, (status, line) in JSON.items():
         ended, found[row] = answer(*line.split())
@@ -219,6 +212,10 @@ def test_json_has_the_keys_that_the_documents_list(answer, here):
     os.truncate(ran["file"], 5000)
     assert (status, set(whole), whole["count"]) == (0, {"files", "count"}, {"whole": 1})
     assert answer("store", "check", "runs")[1]["count"] == {"damaged": 1}
+    for status, line, said in ((1, "run no_such_scene", "no_such_scene"), (2, "run", "scene"),
+                               (2, "run peg_corner --speed 3", "No such option")):  # fmt: skip
+        ended, error = answer(*line.split())
+        assert ended == error["status"] == status and said in error["error"]
     assert answer("compare", "--export", "ours")[1]["problems"] == len(list(here.glob("ours/*.hdf5"))) > 3
 
 

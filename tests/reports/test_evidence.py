@@ -1,5 +1,6 @@
 """The stages of the evidence: stored once, read as they were; what fails costs one row or one stage, and is named."""
 
+import io
 import json
 import math
 import os
@@ -9,6 +10,7 @@ from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -26,6 +28,7 @@ from reports.provenance import UNKNOWN, dispatched, linear_algebra, this_machine
 from reports.report import keep_answer, kept_answer, report_key
 from reports.runner import Runner
 from reports.store import keys
+from reports.store.io import sealed
 from tests.reports.made_up import flipped
 from verification.claims import arm
 from verification.cost import effects
@@ -70,6 +73,7 @@ def test_a_stage_that_is_read_lists_the_runs_of_the_one_that_made_them(tmp_path)
         runner(scene, "IAPB")
         runner.user = "C07"
         runner(scene, "PB")
+        runner.use_again(scene, "IAPB")
         return FINDING
 
     runner = Runner(tmp_path / "runs")
@@ -77,8 +81,9 @@ def test_a_stage_that_is_read_lists_the_runs_of_the_one_that_made_them(tmp_path)
     read = Stage(tmp_path, "mechanics", Finding, "quick").fill(Runner(tmp_path / "runs"), compute)
     assert made.runs == read.runs == runner.used
     commands = [(run.used_by, run.command) for run in read.runs.values()]
-    assert commands == [((user,), f"iapb run peg_corner --set duration=0.4 --world {world}")
-                        for user, world in (("mechanics", "IAPB"), ("C07", "PB"))]  # fmt: skip
+    assert commands == [(users, f"iapb run peg_corner --set duration=0.4 --world {world}")
+                        for users, world in ((("mechanics", "C07"), "IAPB"), (("C07",), "PB"))]  # fmt: skip
+    assert runner.user == ""
     assert {run.made_on for run in read.runs.values()} == {this_machine()}
 
 
@@ -117,6 +122,15 @@ def test_another_blas_kernel_or_numpy_code_is_another_machine_and_other_threads_
     assert said[0] != said[1] == said[2] and "numpy baseline" in said[3]
 
 
+def without_records(content):
+    """A file whose seal holds and whose records are none."""
+    stream = io.BytesIO(content)
+    with h5py.File(stream, "r+") as file:
+        del file["records"]
+        file["records"] = 1
+    return sealed(stream.getvalue())
+
+
 def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path):
     def interrupted(failures):
         raise KeyboardInterrupt
@@ -127,9 +141,11 @@ def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path):
     assert wrong.records is None and wrong.failures[0].error == "ValidationError"
     assert not list(tmp_path.rglob("tables/*.h5"))
     path = filled(tmp_path, lambda _: FINDING).path
-    path.write_bytes(flipped(path.read_bytes()))
-    damaged = filled(tmp_path, lambda _: FINDING)
-    assert damaged.records is None and damaged.failures[0].error == "RunFileError"
+    whole = path.read_bytes()
+    for damage in (flipped, lambda content: content[:-100], without_records):
+        path.write_bytes(damage(whole))
+        damaged = filled(tmp_path, lambda _: FINDING)
+        assert damaged.records is None and damaged.failures[0].error == "RunFileError"
 
 
 def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until_then(tmp_path):

@@ -125,7 +125,7 @@ def precision_rows():
 
 
 def all_inputs():
-    """Return the inputs of all figures but those of scenes in space and some films: made up, or computed in a moment."""
+    """Return the inputs of all figures but those of scenes in space and some films: made up or computed at once."""
     needed = sorted({name for recipe in RECIPES for name in recipe.needs})
     scenes = {"corner": "peg_corner", "device": "peg_corner", "hole": "peg_hole", "group": "arm_pushing",
               "wall": "wall_1d"}

@@ -26,7 +26,7 @@ from reports.store.io import mark_store, sealed
 from reports.store.parts import Parts, PartsLocked, parts_of, read_parts
 from reports.store.runs import opened_run, read_entry
 from reports.uses import parsed, run_command
-from tests.reports.made_up import flipped
+from tests.reports.made_up import flipped, made_run
 from verification.check import Study
 
 WHOLE = load_scene(find_scene("peg_corner"))
@@ -34,9 +34,9 @@ PEG = WHOLE.with_values({"duration": 1.2})
 INPUTS = {"scene": {"name": "peg", "rate": 512}, "law": "IAPB"}
 
 
-def test_a_finished_run_is_neither_computed_again_nor_overwritten_and_a_partial_one_is(tmp_path, make_run):
-    store, run = RunStore(tmp_path), make_run()
-    partial, label = make_run(steps=10, complete=False), "peg corner/IAPB"
+def test_a_finished_run_is_neither_computed_again_nor_overwritten_and_a_partial_one_is(tmp_path):
+    store, run = RunStore(tmp_path), made_run()
+    partial, label = made_run(steps=10, complete=False), "peg corner/IAPB"
     place = store.place_of(INPUTS, label)
     assert not store.get_or_run(INPUTS, lambda: partial, label).complete
     assert read_run(place.partial).steps == 10 and not place.path.exists() and store.entries() == ()
@@ -46,7 +46,7 @@ def test_a_finished_run_is_neither_computed_again_nor_overwritten_and_a_partial_
     assert content_hash(RunStore(tmp_path).get_or_run(INPUTS, pytest.fail, label="any")) == content_hash(run)
     [path] = tmp_path.glob("*.h5")
     before = path.read_bytes()
-    assert store.put(INPUTS, make_run(seed=2)) == path and path.read_bytes() == before
+    assert store.put(INPUTS, made_run(seed=2)) == path and path.read_bytes() == before
     (tmp_path / "other.h5").write_text("no run")
     [entry] = store.entries()
     assert (entry.file, entry.title, entry.content_hash) == (path.name, "peg · IAPB", content_hash(run))
@@ -95,14 +95,6 @@ def test_a_run_is_computed_once_by_all_runners_of_a_folder(tmp_path, computed):
     assert runner(PEG, "PB", keep=False) is not run and computed == ["IAPB", "PB"]
 
 
-def test_whatever_changes_a_run_changes_its_key(tmp_path):
-    runner = Runner(tmp_path)
-    cases = [(PEG, "IAPB", "full"), (PEG, "IAPB", "scale"), (PEG, "PB", "full"), (PEG, "ideal", "full"),
-             (PEG, "CBuc", "full"), (PEG.with_values({"contact.friction": 0.123}), "IAPB", "full"),
-             (PEG.with_values({"couplings.four_channel.damping": [1, 1, 1]}), "IAPB", "full")]  # fmt: skip
-    assert len({runner.file_of(*case).rpartition("-")[2] for case in cases}) == len(cases)
-
-
 def test_ctrl_c_in_a_run_stops_who_asked_for_it_and_keeps_what_was_done(tmp_path, computed):
     def interrupt(done, total):
         raise KeyboardInterrupt
@@ -117,20 +109,6 @@ def test_ctrl_c_in_a_run_stops_who_asked_for_it_and_keeps_what_was_done(tmp_path
     assert [used.status for used in runner.used.values()] == ["partial"]
     runner.progress = None
     assert runner(PEG, "IAPB").complete and computed == ["IAPB"] * 3 and not list(tmp_path.glob("*.partial"))
-
-
-def test_runs_are_listed_under_everything_that_used_them(tmp_path, computed):
-    runner = Runner(tmp_path)
-    with runner.recording("trajectories") as inside:
-        runner(PEG, "IAPB")
-        runner.user = "forces"
-        runner.use_again(PEG, "IAPB")
-        runner(PEG, "PB", keep=False)
-    assert [run.used_by for run in inside.values()] == [("trajectories", "forces"), ("forces",)]
-    with runner.recording("energy"):
-        runner(PEG, "IAPB")
-    assert [run.used_by for run in runner.used.values()] == [("trajectories", "forces", "energy"), ("forces",)]
-    assert runner.user == "" and len(inside) == 2 and computed == ["IAPB", "PB"]
 
 
 def test_every_engine_run_used_before_is_certified(tmp_path):
