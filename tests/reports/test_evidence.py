@@ -142,10 +142,12 @@ def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path):
     assert not list(tmp_path.rglob("tables/*.h5"))
     path = filled(tmp_path, lambda _: FINDING).path
     whole = path.read_bytes()
-    for damage in (flipped, lambda content: content[:-100], without_records):
+    for damage, said in ((flipped, ""), (lambda content: content[:-100], "checksum"),
+                         (without_records, "records is missing")):  # fmt: skip
         path.write_bytes(damage(whole))
         damaged = filled(tmp_path, lambda _: FINDING)
         assert damaged.records is None and damaged.failures[0].error == "RunFileError"
+        assert said in damaged.failures[0].reason
 
 
 def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until_then(tmp_path):

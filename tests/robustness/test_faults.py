@@ -114,6 +114,13 @@ def full_disk(folder, rng):
     assert writer.exitcode == 0 and said.is_file() and len(list(folder.glob("*.h5"))) == 1
 
 
+def forbidden_folder(folder, rng):
+    """Store into a folder that takes no files: a file is in its place."""
+    (folder / "file").write_text("a file where the folder should be")
+    with pytest.raises((OSError, IapbError)):
+        put(folder / "file")
+
+
 def rival_writers(folder, rng):
     """Two processes store the same runs; afterwards each run is there once, whole."""
     sample_run()
@@ -143,7 +150,7 @@ def collecting_writers(folder, rng):
         collector.join()
 
 
-@pytest.mark.parametrize("fault", [killed_writer, full_disk, rival_writers, collecting_writers],
+@pytest.mark.parametrize("fault", [killed_writer, full_disk, forbidden_folder, rival_writers, collecting_writers],
                          ids=lambda fault: fault.__name__)  # fmt: skip
 def test_nothing_finished_is_lost(fault, tmp_path):
     rng = np.random.default_rng(0)
