@@ -4,8 +4,7 @@ The spheres touch on a close-packed lattice. Only a share of the contacts is kep
 diameters. The pile falls on the floor at 1 m/s with a small random velocity of each sphere. The velocity of (21) is
 compared with that of impulses that only push: the engine's `method="poisson"`, which for equal e is Newton's LCP. By
 statement 1 of `agreement` the two velocities are equal if and only if some p >= 0 gives the velocity of (21); for small
-piles non-negative least squares tests this too. All impacts have e = 0, because whether the laws agree does not depend
-on e (statement 2).
+piles non-negative least squares tests this too. All impacts have e = 0 (statement 2: e does not matter).
 """
 
 from __future__ import annotations
