@@ -22,6 +22,7 @@ is either so deep that the coupler always presses, or crosses the surface of the
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 from operator import truediv
@@ -35,7 +36,7 @@ from iapb.scene import Scene, scene_from_text
 from iapb.simulation import Simulation
 from reference.worlds import find_world
 from verification.check import Check, Study
-from verification.finding import MIXED, REFUTED, Part
+from verification.finding import MIXED, REFUTED, REPRODUCED, Part
 from verification.impacts import Floats
 from verification.table import Table
 
@@ -195,8 +196,7 @@ def coupled(ports: Table) -> Part:
         "bound KT/2 + |B| of the coupler", f"ideal sensors: {most[PRESSES, True]:.4f} if the hand keeps pressing, "
         f"{most[CROSSES, True]:.3g} if it moves in and out of contact, because the coupler is already stretched when "
         f"it switches on. Late or coarse sensors: up to {most[PRESSES, False]:.3g} and {most[CROSSES, False]:.3g}",
-        "at most 1",
-        MIXED if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)  # fmt: skip
+        "at most 1", _at_most_one(most.values()))
 
 
 def coordinated(ports: Table) -> Part:
@@ -208,8 +208,13 @@ def coordinated(ports: Table) -> Part:
         "multiple of Colgate's bound for the wall alone", f"up to {max(found['needed / bound']):.3g}: the device "
         f"needs {min(needed):.3g} to {max(needed):.3g} N s/m, because the hand also feels the coupling's damping of "
         f"{COORDINATION[1]:g} N s/m. Up to {max(map(truediv, needed, sums)):.3g} times the bound for wall and coupling "
-        "together", "at most 1, which is proved for CBuc only",
-        MIXED)
+        "together", "at most 1, which is proved for CBuc only", _at_most_one(found["needed / bound"]))
+
+
+def _at_most_one(ratios: Iterable[float]) -> str:
+    """Return the verdict on ratios that should be at most 1, up to rounding."""
+    held = [ratio <= 1.0 + 1e-9 for ratio in ratios]
+    return REPRODUCED if all(held) else MIXED if any(held) else REFUTED
 
 
 def hand_positions(loop: DeviceLoop, kind: str, share: float) -> Floats:
