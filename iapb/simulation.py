@@ -153,7 +153,7 @@ class Simulation:
         """Do the first half of a step: apply hand and coupling, advance the law, send the device its force."""
         world, state, port = blocks = self.world, self.state, self.port
         if self._planned:
-            port.wrench[:] = wrench_of(self.scene, self.time)
+            port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
         if self.compiled:
             self._do(PULL)
         else:
@@ -263,7 +263,7 @@ class Simulation:
         self.port.planned[:steps] = self.port.wrench
         for k in range(steps if self._planned else 0):
             try:
-                self.port.planned[k] = wrench_of(self.scene, (self.steps_done + k) * self.system.dt)
+                self.port.planned[k] = wrench_of(self.scene, (self.steps_done + k + 0.5) * self.system.dt)
             except IapbError as stop:
                 return k, stop
         return steps, None

@@ -111,7 +111,8 @@ _SHORT = BeforeValidator(lambda given: _WORDS.get(given, given) if isinstance(gi
 class Hand(ScenePart):
     """The hand: a force on one body. A constant force is the worst case for stability (paper, section VI).
 
-    The force is the sum of `force`, `force_table` and `force_function`, evaluated at the start of each step.
+    The force is the sum of `force`, `force_table` and `force_function`, evaluated in the middle of each step:
+    at its start, the velocity would keep an error of half a step of the first force.
     """
 
     body: Name = Field(description="the body that the hand holds")

@@ -503,6 +503,9 @@ add("plastic_drop", scene(0.8, [disc("disc", 0.03, 0.1, (0, 1.03, 0))], [FLOOR])
 add("pushed_by_a_function", scene(0.5, [box("box", (0.1, 0.1), 0.1, (0, 0.05, 0))], [FLOOR],
                                   hand={"body": "box", "force_function": ["0", "-1000*sin(t)", "0"]}),
     lambda motion: float(motion.place[:, 0, 1].min()) - 0.05, 0.0, 0.1, "sags below a thousandth of its height", 1e-3)
+add("pushed_to_and_fro", scene(10.0, [box("box", (0.1, 0.1), 1.0, (0, 0.05, 0))], [FLOOR],
+                               hand={"body": "box", "force_function": ["cos(2*pi*t)", "0", "0"]}),
+    lambda motion: float(motion.place[:, 0, 0].max()), 0.5 / np.pi**2, 0.05, "swings on ice, does not drift", 1e-3)
 DOMINOES = [box(f"domino_{i}", (0.02, 0.1), 0.05, (0.05 * i, 0.05, 0), (0.2, 0.04, -4) if i == 0 else (0, 0, 0))
             for i in range(5)]  # fmt: skip
 PLATE_2D = {"name": "plate", "kind": "box", "size": [0.01, 0.2], "center": [0, 0]}
