@@ -151,7 +151,7 @@ def _gains_say(table: Table) -> Iterator[Part]:
     if ours and printed:
         most = " never adds energy" if ours[GAIN] <= 0.0 else \
             f"'s largest relative energy gain is {ours[GAIN]:.1e}, {ours[SHARE]:.2g} of its bound 10 d ε √κ(M)"
-        yield Part(f"In another {ours['impacts']:,} random impacts, of up to 30 coordinates and 100 contacts, the "
+        yield Part(f"In {ours['impacts']:,} random impacts, of up to 30 coordinates and 100 contacts, the "
                    f"engine{most}. In {printed['impacts']:,} of them the paper's formula, computed as printed, adds at "
                    f"worst {printed[GAIN]:.2g} times the kinetic energy before the impact.",
                    REPRODUCED if ours[ABOVE] == 0 else REFUTED)
