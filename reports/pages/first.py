@@ -64,7 +64,7 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
     told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials (tested "
-                 f"conditions) decide this; {unknown:,} more cannot: values are too close, or an effect is absent.",
+                 f"conditions) decide; {unknown:,} more cannot: values are too close, or an effect is absent.",
                  "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
@@ -115,8 +115,8 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     each = ", ".join(f"{part.held} of {part.decided} starts for {part.named or part.name}" for part in parts)
     starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper says that the hand's path with impulses is nearer to the path at a rigid wall than with any other "
-        f"method. Of {starts} starts, only those with clearly different paths count. The claim holds in {each}.")
+        "The paper says that the hand's path with impulses is nearer to the path at a rigid wall than with springs or "
+        f"a coupler. Of {starts} starts, only those with clearly different paths count. The claim holds in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = " and ".join(f"{ahead} of {told} starts for {name}" for name, (ahead, told) in found.items())
@@ -133,7 +133,7 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
         ratios, wanted = (sorted(float(row[name]) for row in hardest(races)) for name in ("ratio", "target"))
         yield (f"In {len(ratios)} scenes at rest or nearly so, our step takes {ratios[0]:.3g} to {ratios[-1]:.3g} "
-               f"times as long as MuJoCo's; our own targets are {wanted[0]:g} to {wanted[-1]:g}.")
+               f"times as long as MuJoCo's (our own targets: {wanted[0]:g} to {wanted[-1]:g}).")
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
         yield (f"Lemke's complementarity method is faster than our engine for {raced.holds.count(False)} of the "
                f"{len(raced.decided)} sizes of impact whose times clearly differ.")

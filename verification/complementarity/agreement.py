@@ -166,8 +166,8 @@ def _map_says(table: Table) -> Iterator[Part]:
     yield Part.of(
         "With one e for all contacts, the two laws agree if and only if some p >= 0 gives IAPB's velocity",
         f"{sum(table['contradictions'])} of {sum(table['cases']):,} impacts contradict this. If the velocities differ "
-        "by Δ in the kinetic metric, IAPB loses ½ (1−e)/(1+e) Δ² more energy than the LCP (largest error: "
-        f"{max(table['defect']):.0e}), at most {max(table['largest extra loss of KE⁻']):.0%} of KE⁻",
+        "by Δ in the kinetic metric, IAPB loses ½ (1−e)/(1+e) Δ² more energy than the LCP (to "
+        f"{max(table['defect']):.0e}). The largest extra loss is {max(table['largest extra loss of KE⁻']):.0%} of KE⁻",
         "no contradiction", "", "statements")
     if scenes := [row for row in rows if row["impacts"].startswith("scene ")]:
         apart = sorted({row["impacts"].removeprefix("scene ") for row in scenes if row["share that agrees"] < 1.0})
@@ -196,8 +196,8 @@ MAP = Check(
     says=_map_says, digits=3,
     note="IAPB against the Newton LCP; distances of v⁺ are in the kinetic metric, relative to |v⁻|. Must pull: no p >= "
     "0 gives IAPB's velocity. Pulls by choice: some p >= 0 gives it, but IAPB's p, the one of least norm, pulls. Left "
-    "approaching: a contact approaches after the impact, with or without a row in (21). Defect: largest error of the "
-    "distance and of extra loss / KE⁻ = (1−e)/(1+e) distance². Without per-body rows, friction and device limits.",
+    "approaching: a contact approaches after the impact, with or without a row in (21). Defect: largest error of two "
+    "predictions, the distance and extra loss / KE⁻ = (1−e)/(1+e) distance². Impacts have no friction or device limit.",
 )  # fmt: skip
 
 

@@ -141,8 +141,8 @@ def _says(table: Table) -> Part:
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
     return Part.of(
         "In impacts on dense piles, can pushing impulses (p >= 0) give the velocity of (21)?",
-        f"in {agree:.0f} of {piles} impacts, with up to {limit} contacts, but not in every impact with so few. In "
-        f"impacts with more than {limit} contacts, {pulling:.0f} % of the impulses of (21) pull. The world IAPB-push "
+        f"in {agree:.0f} of {piles} impacts, all with at most {limit} contacts (not in all of those). In impacts "
+        f"with more than {limit} contacts, {pulling:.0f} % of the impulses of (21) pull. The world IAPB-push "
         "(method \"poisson\") lets impulses only push; its velocities differ from the LCP's by at most "
         f"{max(table['pushing from the LCP']):.0e} |v⁻|", "in all impacts",
         verdict_of_share(agree / piles), "piles",
@@ -156,6 +156,6 @@ def piles(folders: Iterable[Path | str]) -> Check:
         timed=TIMES, digits=3,
         note="Equation (21) against impulses that only push (as in the world IAPB-push), at e = 0. Each pile is "
         "resolved twice, with the rows of the approaching and of all touching contacts. A random share of the contacts "
-        "is kept, so that redundancy varies; contacts and redundant: means. A pile agrees if some p >= 0 gives the "
+        "is kept, to vary redundancy; contacts and redundant rows are means. A pile agrees if some p >= 0 gives the "
         "velocity of (21). Distances are in the kinetic metric, relative to |v⁻|. Times include the call from Python.",
     )  # fmt: skip

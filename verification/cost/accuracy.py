@@ -310,7 +310,7 @@ def choices(measured: Table) -> Table:
         rows.append(row)
     return table_from(rows, digits=2, timed=CHOSEN[3:], note=(
         f"The compiled method, and the method called from Python, that solve most of the nine impacts to {SOLVED:g} in "
-        "time; ties go to the smaller largest error. Time and error are medians. None: no method solves half of the "
+        "time; ties as in the picture. Time and error are medians. None: no method solves half of the "
         "impacts; “nearest” is then the method that answers most impacts in time, with its largest error."))
 
 

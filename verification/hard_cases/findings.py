@@ -29,15 +29,15 @@ _NOTES = {
               "(KE⁺ − KE⁻)/KE⁻, exactly. Forward error: |v⁺ − truth| / |v⁻| in the kinetic metric. A backward stable "
               "method may gain 10 d ε √κ(M) of the energy and have an error of 10 n ε √κ_M (√κ_M + κ_A) by rounding: n "
               "is the larger of c rows and d coordinates, κ_M the condition number of M scaled to a unit diagonal, κ_A "
-              "that of A = J L⁻ᵀ with M = L Lᵀ. Smallest error detected: added to a correct impulse or velocity, a "
-              "relative error of this size changes the verdict. Time: median of a call.",
+              "that of A = J L⁻ᵀ with M = L Lᵀ. Smallest error detected: the smallest relative error "
+              "of a correct impulse or velocity that changes the verdict. Time: median of a call.",
     "motion": "Stable: gain and error are at most those allowed (what rounding or the time step may cause), the "
               "restitution residual is at most 1e-8. Energy gain: the largest amount of energy created, relative to "
               "the kinetic energy at the start plus the work of hand and gravity. Forward error: distance from the "
               "known motion, relative to a length or speed of that motion. Restitution residual: the largest of all "
-              "collisions; in a collision of several contacts, the mean of the contacts, weighted by their impulses. "
-              "Smallest error detected: added to displacements and changes of velocity of a stable motion, a relative "
-              "error of this size changes the verdict. Time: median of a step.",
+              "impacts; in an impact of several contacts, the mean of the contacts, weighted by their impulses. "
+              "Smallest error detected: the smallest relative error of displacements and changes of velocity that "
+              "changes the verdict of a stable motion. Time: median of a step.",
 }  # fmt: skip
 
 

@@ -20,9 +20,9 @@ def _answer(tables: Mapping[str, Table], _: Sequence[Part]) -> str:
     worst, balls = max(tables[AGAINST_PINOCCHIO.key]["worst"], default=0.0), tables[LINKED_IMPACTS.key]
     lost = min(balls.where(treatment=PER_BODY)["momentum change"])
     return (f"Mass matrices, forces and Jacobians differ from Pinocchio's by at most {worst:.1e} of the largest "
-            "entry. With (13)-(14), a separate impulse for each of two touching bodies, impacts of a ball on resting "
-            f"balls change the total momentum by at least {lost:.2g} times its value: the ball rebounds as from a "
-            "wall. A ball rolls over flat facets without false collisions only if it stays on the surface and the "
+            "entry. (13)-(14) give each of two touching bodies its own impulse: a ball rebounds from resting balls as "
+            f"from a wall, and the total momentum changes by at least {lost:.2g} times its value. "
+            "A ball rolls over flat facets without false collisions only if it stays on the surface and the "
             "coherence distance exceeds the distance between the contacts on neighbouring facets.")
 
 

@@ -79,8 +79,8 @@ def on_proofs(records: Sequence[ProofRecord], failures: Sequence[Failure] = (),
         accepted = sum(one.holds is True for one in asked)
         told = (f"Coq proves {sum(one.coq == YES for one in records)} of the statements too, and {accepted} of "
                 f"{len(development)} theorems about code: a checker of impacts in exact integers, and the last step of "
-                "the engine's impact in floating point. Axioms: those of the real numbers, and classical logic (of "
-                f"Flocq, the library for floating point). {ARGUED}" if asked or lost else
+                "the engine's impact in floating point. Axioms: those of the real numbers, and classical logic, "
+                f"which Coq's library for floating point, Flocq, uses. {ARGUED}" if asked or lost else
                 f"Another {len(development)} theorems, about the code, need Coq, which is not installed; they were not "
                 "checked here.")  # fmt: skip
         if lost:

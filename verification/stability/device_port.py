@@ -193,9 +193,9 @@ def coupled(ports: Table) -> Part:
         most[case] = max(most.get(case, 0.0), row["needed / bound"])
     return Part.of(
         "CBuc at a rigid wall: the least device damping at which the hand draws no energy, as a multiple of Colgate's "
-        "bound KT/2 + |B| of the coupler", f"ideal sensors: {most[PRESSES, True]:.4f} if the hand keeps pressing, "
-        f"{most[CROSSES, True]:.3g} if it moves in and out of contact, because the coupler is already stretched when "
-        f"it switches on. Late or coarse sensors: up to {most[PRESSES, False]:.3g} and {most[CROSSES, False]:.3g}",
+        "bound KT/2 + |B| of the coupler", f"{most[PRESSES, True]:.4f} if the hand keeps pressing (late or "
+        f"coarse sensors: up to {most[PRESSES, False]:.3g}); {most[CROSSES, True]:.3g} if it moves in and out of "
+        f"contact (up to {most[CROSSES, False]:.3g}), because the coupler is already stretched when it switches on",
         "at most 1", _at_most_one(most.values()))
 
 
@@ -232,8 +232,8 @@ PORT = Check(
     cases=lambda study: product(WALLS[study.depth], SENSORS, MOTIONS), row=_leak,
     says=lambda table: (coupled(table), coordinated(table)),
     note="The complete device loop at 512 Hz; the worst of several speeds of the hand. The hand moves by ±0.5 mm: "
-    "it always presses, or it crosses the surface. Late: readings and forces each come one step late; coarse: "
-    "readings rounded to 10 µm. Stiffness and damping are those of the coupler in CBuc, else of the wall. The "
+    "it always presses, or it crosses the surface. Late here: readings and forces each come one step late, without "
+    "rounding; coarse: readings rounded to 10 µm. Stiffness and damping: of the coupler in CBuc, else of the wall. The "
     "four-channel coupling has the gains of Table I, but no channel for the hand's force: the motion of the hand is "
     "given. Leak: energy that the hand draws from the loop at b = KT/2 + |B|.",
 )

@@ -79,7 +79,7 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
     return Part(
         f"Of {theirs.size:,} walls ({theirs.size // len(groups)} pairs of stiffness and damping in {len(groups)} "
         f"loops of given rate, sensor and device damping), {ours.sum()} are stable with impulses and {theirs.sum()} "
-        f"without. With impulses, each loop has {min(more):.2f} to {max(more):.2f} times as many stable walls. {only}.",
+        f"without. With impulses, a loop has {min(more):.2f} to {max(more):.2f} times as many. {only}.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Number of stable walls with impulses, and without", target="more with impulses, none only without",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
@@ -114,7 +114,7 @@ def _hard(table: Table) -> Part:
         "First rise of the force (rate-hardness) and penetration with impulses, relative to penalties, at the paper's "
         f"wall damping of {PAPER_DAMPING:g} N s/m",
         f"{min(harder):.3g} to {max(harder):.3g} times as hard, {min(deeper):.2f} to {max(deeper):.2f} times as deep "
-        "(range over the loops of the median over stiffnesses)", "harder, no deeper",
+        "(a median per loop; range of the loops)", "harder, no deeper",
         REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)
 
 
@@ -131,7 +131,7 @@ HARDNESS = Check(
     key="hardness", question="How hard does a wall feel?", cases=lambda study: loops(), row=_hardness, says=_hard,
     digits=3, note="Wall damping 50 N s/m, as in the paper. Rate-hardness: the rise of the force per second over the "
     "first step of contact, divided by the approach speed (Lawrence and others, 2000). An impulse is given in one "
-    "step, so its rate-hardness grows with the square of the rate. A device with limited force renders part of it.",
+    "step, so its rate-hardness grows with the square of the rate. A limited device renders part of this rise.",
 )
 
 contact_stability = Topic(
