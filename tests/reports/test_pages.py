@@ -248,7 +248,7 @@ def test_the_first_page_shows_every_part_of_a_claim_with_its_count_and_every_top
     for text in ("holds where tilt ≤ 0.015 rad", "over all conditions 30 of 40</span>", "fails, as printed",
                  "fails (beyond the paper)", "Fails in a quantity<", "1 of 40 (7 more cannot tell)"):
         assert text in first, text
-    assert "125 trials (tested conditions) decide this; 7 more" in page
+    assert "125 trials (tested conditions) decide; 7 more" in page
     assert badge_words(topics[0]) == "1 of 2 findings fails" and badge_words(one("p", Part("a", REFUTED))) == "fails"
 
 
