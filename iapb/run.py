@@ -55,9 +55,9 @@ class ContactTable:
 
 @dataclass(frozen=True)
 class ImpactTable:
-    """Resolved collisions: one row per step and island of a colliding group (paper section V).
+    """Resolved impacts: one row per step and island of a colliding group (paper section V).
 
-    An island is a set of trees connected by contacts of the collision. A tree that merely touches them is not in it.
+    An island is a set of trees connected by contacts of the impact. A tree that merely touches them is not in it.
     """
 
     step: Annotated[Integers, quantity("impact", "1", "step in which it happened")]
@@ -188,7 +188,7 @@ class Run:
 
     @property
     def summary(self) -> str:
-        """Scene, world, steps, collisions and penetration on one line."""
+        """Scene, world, steps, impacts and penetration on one line."""
         end = "" if self.complete else f", stopped: {self.stopped}"
         deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
         return (f"{self.scene_name} in {self.world}: {self.steps} steps of {1e3 * self.dt:.4g} ms{end}, "

@@ -250,7 +250,7 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
     counts = [sum(count or 0 for count in judged.column(column.key)) for column in trials.columns if column.cases]
     cases = max(decided, *counts, 0)
     if decided < LEAST_DECIDED <= cases:
-        part, said = replace(part, cases=cases), f"{said} ({cases} cases in all)"
+        part, said = replace(part, cases=cases), f"{said} ({cases} cases in the trials that can tell)"
     elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE:
         part = replace(part, verdict=NOT_TESTABLE if part.verdict == REPRODUCED else part.verdict)
         said = f"{said}; fewer than {LEAST_DECIDED} trials can tell"

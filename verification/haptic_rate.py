@@ -34,8 +34,8 @@ def _kernels_say(table: Table) -> Part:
     slower = table.that(False)
     sizes = {name: slower.where(problem=name)["contacts"] for name in dict.fromkeys(slower["problem"])}
     tried = {name: len(table.where(problem=name).rows) for name in sizes}
-    where = " and ".join(f"at {len(found)} of {tried[name]} sizes of a {name.split()[-1]} (with "
-                         f"{', '.join(map(str, found))} contacts)" for name, found in sizes.items())
+    where = " and ".join(f"at {len(found)} of {tried[name]} sizes of a {name.split()[-1]} ("
+                         f"contacts: {', '.join(map(str, found))})" for name, found in sizes.items())
     return faster("both methods compiled", "Lemke's method", "sizes of impact", table.holds, where)
 
 

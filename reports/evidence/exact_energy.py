@@ -30,7 +30,7 @@ _RUNS = ("Gains: impacts that gain energy; the largest gain is relative to KE⁻
          "= impulse, Jᵀp = impulse and Jv⁺ = −e Jv⁻, with Δv = v⁺ − v⁻ and recorded impulses. –: does not apply.")
 _NOTE = ("A family is one kind of random impacts, with up to 8 coordinates and contacts. Light directions: v⁻ along "
          "the lightest axis of M. 600 decades: masses and speeds of nearly all sizes of doubles. Moved: share of the "
-         "impacts with v⁺ ≠ v⁻. Cancelled: those in which the clamp shortened v⁺ − v⁻ to zero. Energy cost, at e = 1: "
+         "impacts with v⁺ ≠ v⁻. Cancelled: number with v⁺ = v⁻ for want of a passive step. Energy cost, at e = 1: "
          "the energy lost, less that lost without clamp and refinement (which corrects the rounding of M's Cholesky "
          "factor). It is relative to KE⁻, in units of 10 d ε √κ(M) for d coordinates. Rounding v⁺ to doubles changes "
          "the energy by at most one unit. –: not computed.")

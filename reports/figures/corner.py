@@ -52,7 +52,7 @@ _MOTION = {"depth": "penetration [mm]", "apart": "largest distance of tool and d
 _FORCES = {"Fx": "peak |Fx| [N]", "Fy": "peak |Fy| [N]", "torque": "peak |τ| [N m]", "held Fx": "held Fx [N]",
            "held Fy": "held Fy [N]", "held torque": "held τ [N m]"}  # fmt: skip
 _FROM_IDEAL = ("Distances from the ideal path of the hand are root mean squares from the first contact until all "
-               "worlds settle, as in C10. ")
+               "worlds of the figure settle or the run ends. ")
 _SETTLED = "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
 _HELD = ("Held: mean over the last fifth of the run. The hand pushes with Fx = −0.32 N, Fy = 0.4 N, so a world in "
          "balance holds 0.32 and −0.4 N.")  # fmt: skip

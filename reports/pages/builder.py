@@ -115,7 +115,7 @@ def map_of(claim: Finding) -> Figure | None:
     table = claim.tables.get(claim.key)
     if not claim.axes or claim.verdict == finding.REPRODUCED or table is None or not table.rows:
         return None
-    caption = f"Each mark is one pair of conditions of {claim.key}; the dot is smaller if only some of its trials hold."
+    caption = f"Each place is a pair of values of the axes; smaller dot: {claim.key} holds in only some trials there."
     return condition_map(f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes)
 
 
@@ -179,9 +179,9 @@ def judged(part: Part) -> str:
 def counted(part: Part) -> str:
     """Return as text in how many of the decided trials a part holds, how many cannot tell, and its region's counts."""
     if not part.decided and not part.unknown:
-        return "no trials"
+        return "no trials" if part.verdict == finding.NOT_TESTABLE else ""
     unknown = f" ({part.unknown} more cannot tell)" if part.unknown else ""
-    cases = f" ({part.cases} cases in all)" if part.cases else ""
+    cases = f" ({part.cases} cases in these trials)" if part.cases else ""
     if not (region := part.region):
         return f"{part.held} of {part.decided}{cases}{unknown}"
     share = f"; {region.share:.0%} of the tested range" if region.share else ""

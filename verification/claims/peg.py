@@ -245,7 +245,7 @@ def _forces_say(table: Table) -> str:
 
     return (
         f"Largest force of all starts with IAPB: {each(LARGE, max)}. Mean distance of the force, in contact but "
-        "outside impacts, from the force that balances the hand (0.32 N in x, 0.4 N in y), as the median of all "
+        "outside impacts, from the force that balances the hand (0.32 N in x, −0.4 N in y), as the median of all "
         f"starts: {each(BALANCE, np.median)}. The paper says “closer to the ideal forces” and names no norm; we take "
         f"the mean of |F − F_ideal| of forces averaged over {AVERAGED} steps. Without this average, the time step of "
         "the ideal world would change the verdict. IAPB is closest in "
@@ -460,7 +460,7 @@ C15 = peg_claim(
     place="Section VII, Fig. 12 and 13 (there an experiment; here a simulation)",
     quantity="How often a corner of the device's peg leaves a wall by more than 10 µm after touching it; time from "
     "the first contact until the device stays below 1 mm/s and 0.01 rad/s. Beyond the paper: larger collision "
-    "thresholds.", note="Settling times in s. Lead: value of PB minus value of IAPB.",
+    "thresholds.", note="Settling times in s. Lead: PB minus IAPB; of times, the least of three, 0 if signs differ.",
     tolerance="Strictly fewer bounces: a tie fails, but a trial without a bounce in either world cannot tell. Sooner "
     "by at least one step (1/512 s) with the two speeds as given, halved and doubled; a trial cannot tell if the "
     "difference is smaller or the three pairs of speeds disagree.",
@@ -503,7 +503,7 @@ def _separation_says(table: Table) -> str:
 C16 = peg_claim(
     "C16", "Scaling and spreading keep tool and device together on impact; saturating does not.",
     limited=True, place="Section VI",
-    quantity="Largest change of the distance between tool and device in one step with an impact: position and angle.",
+    quantity="Largest change of the offset between tool and device, per coordinate, in one step with an impact.",
     tolerance="Together: at most 1e-6 m and rad, a hundredth of what saturating causes. Apart: more.",
     row=_separation, holds=_separation_holds, says=_separation_says, parts=("rendering",),
     axes=("tilt", "force_limit", "rendering"),

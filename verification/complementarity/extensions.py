@@ -113,8 +113,8 @@ def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | 
 
 FRICTION = Check(
     key="friction", question="In impacts with dry friction, the law of the world IAPB-friction never adds energy. If "
-    "every contact pushes, it gives the velocity of Coulomb's law (a nonlinear complementarity problem, NCP). With e > "
-    "0 the NCP and its convex relaxation (CCP) may add energy.",
+    "every contact pushes and no friction is reduced, it gives the velocity of Coulomb's law (a nonlinear "
+    "complementarity problem, NCP). With e > 0 the NCP and its convex relaxation (CCP) may add energy.",
     cases=lambda study: product(RESTITUTIONS, FRICTIONS), row=with_friction, rule=verdict_of_trials, digits=2,
     holds=lambda row: bool(row["share equal to the NCP"] == row["all contacts push"]
                            and row["largest change of KE, IAPB"] <= GAIN),

@@ -141,7 +141,7 @@ def _says(table: Table) -> Part:
                                        weights=[row["piles"] for row in beyond]))  # fmt: skip
     return Part.of(
         "In impacts on dense piles, can pushing impulses (p >= 0) give the velocity of (21)?",
-        f"in {agree:.0f} of {piles} impacts, all with at most {limit} contacts (not in all of those). In impacts "
+        f"in {agree:.0f} of {piles} impacts{f', the largest with {limit} contacts' if agree else ''}. In impacts "
         f"with more than {limit} contacts, {pulling:.0f} % of the impulses of (21) pull. The world IAPB-push "
         "(method \"poisson\") lets impulses only push; its velocities differ from the LCP's by at most "
         f"{max(table['pushing from the LCP']):.0e} |v⁻|", "in all impacts",

@@ -166,8 +166,8 @@ def summary(effects: Mapping[str, Table]) -> Table:
 
     return table_from((row for given in effects.items() for row in rows(*given)), digits=3,
                       timed=("time saved", "best of its error"),
-                      note="Best of its error: leaving out any other effect saves less time or makes a larger "
-                      f"error. Time saved 0: {_BELOW}.")
+                      note="Best of its error: no other effect saves more time with no larger error, or as much "
+                      f"time with a smaller error. Time saved 0: {_BELOW}.")
 
 
 def steps(effects: Mapping[str, Table]) -> Table:

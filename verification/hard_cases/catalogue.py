@@ -80,7 +80,7 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         motions.wall, 500, "a penalty wall throws the tool back faster than it arrived",
         "the wall creates no energy: with IAPB the spring returns less than the first impulse has taken"),
     "wall_far_beyond_the_bound": partial(
-        motions.wall, 2000, "while the contact lasts only the spring acts, and a bounce takes about two time steps",
+        motions.wall, 2000, "while the contact lasts only the spring acts; half its period is about two time steps",
         "a rigid wall creates no energy. We expect IAPB and PB to fail: so stiff a spring, evaluated once a "
         "step, creates energy"),
     **_named(motions.wedged_peg_motion),

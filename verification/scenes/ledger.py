@@ -206,7 +206,7 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
         f"bodies overlap by at most {deepest['most penetration']:.2f} mm. The energy errors of the time steps add "
         f"up to at most {widest[OPEN]:.1f} % of the energy exchanged (“{_title(widest['scene'])}”). In {falls} of "
         f"{len(residuals)} scenes this error is rounding, or falls with shorter steps as fast as the integrator's "
-        "order predicts."
+        "order predicts (or by at most 0.25 less)."
     )
 
 

@@ -196,7 +196,7 @@ def coupled(ports: Table) -> Part:
         "bound KT/2 + |B| of the coupler", f"{most[PRESSES, True]:.4f} if the hand keeps pressing (late or "
         f"coarse sensors: up to {most[PRESSES, False]:.3g}); {most[CROSSES, True]:.3g} if it moves in and out of "
         f"contact (up to {most[CROSSES, False]:.3g}), because the coupler is already stretched when it switches on",
-        "at most 1", _at_most_one(most.values()))
+        "at most 1", _at_most_one(most.values()) if most[PRESSES, True] <= 1.0 + 1e-9 else REFUTED)
 
 
 def coordinated(ports: Table) -> Part:

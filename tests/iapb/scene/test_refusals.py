@@ -214,6 +214,13 @@ def test_all_mistakes_come_at_once_as_an_editor_expects_them() -> None:
     assert {m.path for m in caught.value.mistakes} == {"bodies[3].mass", "contact.frition", "device.delay"}
 
 
+@pytest.mark.parametrize("part", ["contact", "hand", "device", "couplings.unilateral", "bodies.arm", "walls.post"])
+def test_unknown_fields_are_refused_everywhere(part: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        FULL.with_values({f"{part}.masss": 1})
+    assert caught.value.mistakes[0].path.endswith(".masss")
+
+
 def test_bodies_of_one_tree_stand_together() -> None:
     plain = FULL.resolved()
     plain["bodies"] = [plain["bodies"][i] for i in (0, 1, 3, 2)]

@@ -126,7 +126,7 @@ def test_few_trials_reproduce_nothing_but_one_that_fails_counts(held, failed, ve
 def test_a_trial_may_stand_for_many_cases():
     of = {n: judge_part("x", table([{"impacts": n}] * 2, [YES, UNKNOWN], cases=["impacts"])) for n in (9, 10)}
     assert of[9].verdict == NOT_TESTABLE and of[10].verdict == REPRODUCED
-    assert of[10].sentence == "holds in 1 of 1 trials; 1 more cannot tell (10 cases in all)."
+    assert of[10].sentence == "holds in 1 of 1 trials; 1 more cannot tell (10 cases in the trials that can tell)."
 
 
 def trials(holds, widths=(1.0, 2.0, 3.0, 4.0)):
