@@ -56,7 +56,7 @@ def which_method(numbers: Table) -> Drawn:
 
 def power_of_error(value: float) -> str:
     """Return an error in a few characters, such as 7e-14."""
-    return f"{value:.0e}".replace("e-0", "e-") if value < 0.1 else f"{value:.1f}"
+    return f"{value:.0e}".replace("e-0", "e−").replace("-", "−") if value < 0.1 else f"{value:.1f}"
 
 
 def _contacts(row: Row) -> str:

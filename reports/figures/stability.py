@@ -46,7 +46,7 @@ def _walls(number: int, loop: tuple[Any, ...], walls: Table, damping: np.ndarray
         states = (theirs & ours, ours & ~theirs, theirs & ~ours, neither & ~grows, neither & grows)
         for where, look in zip(states, _HOLDS.values(), strict=True):
             plot.marks(zip(K[where], B[where], strict=True), look, markersize=3.6)
-        if (bound > 0.0).any():
+        if sensors == "ideal" and (bound > 0.0).any():  # Colgate's condition is for ideal sensors
             fine = np.geomspace(stiffness[0], 2.0 * b * rate * 0.999, 60)
             plot.curve(zip(fine, np.maximum(b - 0.5 * fine / rate, shown[0] * 0.7), strict=True), BOUND)
         plot.log("stiffness [N/m]", "damping [N s/m]", xlim=(stiffness[0] / 1.3, stiffness[-1] * 1.3),

@@ -64,7 +64,7 @@ def hero(tilted: Mapping[float, Mapping[str, Run]]) -> Drawn:
         Panel(paths.svg.replace("</svg>", curves + "</svg>"), "Paths of the hand in four worlds, nearest to the "
               f"rigid walls at a tilt of {np.degrees(shown):.2f}°: {said}.", "The path of the hand, magnified"),
     )  # fmt: skip
-    ends = {"least": f"{np.degrees(min(tilted)):.2g}", "most": f"{np.degrees(max(tilted)):.3g}"}
+    ends = {"least": f"{np.degrees(min(tilted)):.2g}", "most": f"{np.degrees(max(tilted)):.2f}"}
     return Drawn(panels, numbers, {text: STYLES[name] for name, text in CURVES.items()}, ends)
 
 

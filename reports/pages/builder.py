@@ -172,7 +172,7 @@ def badge_words(topic: Finding) -> str:
 
 def judged(part: Part) -> str:
     """Return the verdict on a part in words: whether its target is met, if it has one."""
-    met = {finding.REPRODUCED: "met", finding.MIXED: "missed", finding.REFUTED: "missed"} if part.target else FINDINGS
+    met = {finding.REPRODUCED: "met", finding.MIXED: "in part", finding.REFUTED: "missed"} if part.target else FINDINGS
     return part.outcome if part.role or part.region else met.get(part.verdict, FINDINGS[part.verdict])
 
 

@@ -64,7 +64,7 @@ def facts(evidence: Evidence) -> tuple[Fact, ...]:
     parts = [part for claim in evidence.claims for part in claim.parts]
     decided, unknown = (sum(getattr(part, of) for part in parts if not part.role) for of in ("decided", "unknown"))
     told = [Fact("Tested", f"{len(claims)} claims of the paper: {'; '.join(counts)}. {decided:,} trials (tested "
-                 f"conditions) decide; {unknown:,} more cannot: values are too close, or an effect is absent.",
+                 f"conditions) decide; {unknown:,} more cannot: they show no clear difference.",
                  "claims")
             ] if claims else []  # fmt: skip
     for label, kind, wanted in (("Holds", KINDS[0], True), ("Fails", KINDS[4], False)):
@@ -103,8 +103,8 @@ def _forces(claim: Finding | None, limited: Finding | None) -> Iterator[tuple[bo
             for device, each in ratios.items() if each]  # fmt: skip
     if said:
         yield all(median(each) > 1.0 for each in ratios.values() if each), (
-            "The paper says that impulses push harder than springs alone. Compared with springs alone, the largest "
-            f"force on the hand in x and in y is {', and '.join(said)}.")
+            "The paper says that impulses push harder than springs alone. Compared with them, the largest force on the "
+            f"hand, in x (along the floor) and y (along the wall), is {', and '.join(said)}.")
 
 
 def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
@@ -121,9 +121,8 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = " and ".join(f"{ahead} of {told} starts for {name}" for name, (ahead, told) in found.items())
         yield all(ahead == told > 0 for ahead, told in found.values()), (
-            f"If the peg is tilted by at most {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} "
-            f"starts), impulses bring the hand's path nearest to the path at a rigid wall in {each} (starts with "
-            "similar paths do not count).")
+            f"At tilts up to {degrees(Condition().tilt):.2f}° ({Condition().tilt:g} rad; {of} starts), impulses bring "
+            f"the hand's path nearest to the path at a rigid wall in {each}; starts with similar paths do not count.")
 
 
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
@@ -132,8 +131,8 @@ def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
         yield f"A time step of the peg in the corner takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
         ratios = sorted(float(row["ratio"]) for row in hardest(races))
-        yield (f"In {len(ratios)} scenes at rest or nearly so, our step takes {ratios[0]:.3g} to {ratios[-1]:.3g} "
-               "times as long as MuJoCo's.")
+        yield (f"In {len(ratios)} scenes at rest or nearly so, our step takes {ratios[0]:.0%} to {ratios[-1]:.0%} of "
+               "the time of MuJoCo's.")
     if (raced := rate.tables.get("compiled, IAPB and Lemke")) and raced.decided:
         yield (f"Lemke's complementarity method is faster than our engine for {raced.holds.count(False)} of the "
                f"{len(raced.decided)} sizes of impact whose times clearly differ.")

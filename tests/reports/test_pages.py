@@ -289,7 +289,7 @@ def test_the_first_page_maps_c10_and_small_tilts_hold_only_if_every_start_that_c
     assert 'id="where-c10"' not in joined(Evidence(claims=(fewer,)))
     for lost, label in ((0, "Holds"), (1, "Fails")):
         said = told(c10(("x", "y", ALL_THREE), lost))
-        for text in ("at most 0.86° (0.015 rad; 24 starts)", f"in {24 - lost} of 24 starts for x"):
+        for text in ("up to 0.86° (0.015 rad; 24 starts)", f"in {24 - lost} of 24 starts for x"):
             assert text in said[label]
 
 

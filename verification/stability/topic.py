@@ -83,8 +83,8 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
         asked="Number of stable walls with impulses, and without", target="more with impulses, none only without",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
-        miss=f"of {theirs.size:,} walls {lost} are stable only without impulses ({there or 'none'} of them at the "
-             f"paper's damping), and {int((ours & ~theirs).sum())} only with impulses"
+        miss=f"impulses make {lost} of {theirs.size:,} walls unstable ({there or 'none'} at the paper's damping) and "
+             f"{int((ours & ~theirs).sum())} stable"
         if lost else "")
 
 
