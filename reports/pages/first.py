@@ -113,10 +113,9 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
     if claim is None or not parts:
         return
     each = ", ".join(f"{part.held} of {part.decided} starts for {part.named or part.name}" for part in parts)
-    starts = max(part.decided + part.unknown for part in parts)
     yield all(part.verdict in (REPRODUCED, WHERE) for part in parts), (
-        "The paper says that the hand's path with impulses is nearest to the path at a rigid wall. Of "
-        f"{starts} starts, those with clearly different paths count. The claim holds in {each}.")
+        "The paper says that impulses bring the hand's path nearest to the path at a rigid wall. Where the paths "
+        f"clearly differ, this holds in {each}.")
     if (table := claim.tables.get(claim.key)) and (small := small_tilts(table)).rows:
         found, of = {name: closest_in(small)[name] for name in ("x", "y")}, len(small.where(part="x").rows)
         each = " and ".join(f"{ahead} of {told} starts for {name}" for name, (ahead, told) in found.items())

@@ -277,7 +277,7 @@ def test_the_answer_is_made_from_the_claims():
     said = told(one("C10", x, turned, ours), forces, one("C14", tables={"C14": table}))
     assert "8 times as large on a device without force limit (median of 3 values), and 3 times" in said["Holds"]
     assert "in 40 of 40 starts for x, 1 of 40 starts for rotation." in said["Fails"] and "of 9" not in said["Fails"]
-    assert "The claim holds in 40 of 40 starts for x." in told(one("C10", x, ours))["Holds"]
+    assert "this holds in 40 of 40 starts for x." in told(one("C10", x, ours))["Holds"]
 
 
 def test_the_first_page_maps_c10_and_small_tilts_hold_only_if_every_start_that_can_tell_does():
