@@ -83,6 +83,12 @@ def test_facing_contacts_with_restitution_step_by_poisson_and_say_so() -> None:
     assert early.restitution_law == POISSON and 1e-4 + DT * early.velocity[0] >= 0.0  # before it passes
 
 
+def test_a_resting_contact_under_load_does_not_hop() -> None:
+    found = step([[1.0]], [0.0], [-9.81], [[1.0]], [0.0], 0.5, scheme="stewart-trinkle")
+    assert found.velocity == pytest.approx([0.0], abs=1e-15) and found.impulse == pytest.approx([9.81 * DT])
+    assert step([[1.0]], [0.1], [-100.0], [[1.0]], [0.0], 0.5).restitution_law == NEWTON  # the load closes it
+
+
 def test_an_open_contact_may_not_pass_where_its_own_restitution_is_zero() -> None:
     gap, v = np.array([1e-4, 1e-4]), np.array([-1.0, -1.0])
     found = rigid_step(np.eye(2), v, np.zeros(2), DT, np.eye(2), gap, v, np.array([0.0, 0.5]))
@@ -198,6 +204,8 @@ def test_a_box_slides_straight_in_space_and_stops_where_the_textbook_says(fricti
     expected, near = 0.5**2 / (2.0 * 0.6 * 9.81), {"coulomb": 1e-3, "relaxed": 2e-3}[friction]
     assert run.complete and run.q[-1, :2] == pytest.approx(expected * np.array([0.6, 0.8]), abs=near)
     assert np.abs(run.v[-1]).max() < 2e-2
+    drag = run.contacts.friction_force[: run.contacts.offsets[1]].sum(axis=0)  # [N]
+    assert drag == pytest.approx(run.friction_force[0, :3], abs=1e-9) and np.linalg.norm(drag) > 5.0
     assert run.q[:, 2].max() <= 0.01 + {"coulomb": 1e-9, "relaxed": (0.6 * 0.5) ** 2 / (2.0 * 9.81)}[friction]
 
 
