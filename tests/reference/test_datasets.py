@@ -37,6 +37,11 @@ def test_siconos_files_are_read_by_columns(name: str) -> None:
     assert problem.asymmetry == 0.0 or not Solution(transposed, solution).solved(1e-3)
 
 
+def test_a_siconos_file_lists_columns(tmp_path: Path) -> None:
+    (tmp_path / "a.dat").write_text("2\n0\n2 2 2 2\n1 2 3 4\n5 6\n")
+    assert read_problem(tmp_path / "a.dat").problem.delassus.tolist() == [[1, 3], [2, 4]]
+
+
 @shared
 def test_every_file_is_read() -> None:
     files = problem_files(PROBLEMS)

@@ -131,6 +131,12 @@ def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
     assert np.abs(v[:, 1]).max() <= truth.bound.velocity
 
 
+def test_the_bound_holds_all_the_bounces_that_are_neglected() -> None:
+    low = {"bodies.body_0.position": [0, 0.04, 0], "bodies.body_0.velocity": [0, -1e-3, 0]}
+    height = (0.5e-3) ** 2 / (2.0 * G)  # of the first one
+    assert scene_truth(bouncing(0.5).with_values(low), 0.05).bound.position >= 2.0 * height / (1.0 - 0.25)
+
+
 @pytest.mark.parametrize(("given", "error", "says"), [
     ((lambda: DROP.with_values({"hand": {"body": "body_0"}}), 0.1, True), ArgumentError, "a scene without quaternions"),
     ((lambda: load_scene(find_scene("box_stack")), 0.1), SolverError, "box_stack: .* contacts overlap"),
@@ -158,6 +164,14 @@ contact: {stiffness: 2e5, damping: 60, restitution: 0.0}
 
 def limited_arm(**values: object) -> Scene:
     return scene_from_text(LIMITED).with_values(values)
+
+
+def test_a_device_like_its_tool_goes_with_it_where_velocities_make_forces() -> None:
+    gains = {"four_channel": {"stiffness": [10, 10], "damping": [1, 1]}}
+    arm = limited_arm(gravity=[0, 0], device={}, hand={"body": "lower"}, couplings=gains, **{
+        "bodies.upper.joint_damping": 0, "bodies.lower.position": [-0.3]})
+    tool_and_device = scene_truth(arm, 0.2, coupled=True).segments[0][2](0.1)
+    assert tool_and_device[:4] == pytest.approx(tool_and_device[4:], abs=1e-8)
 
 
 @pytest.mark.parametrize("world", ["IAPB", "ideal"])
