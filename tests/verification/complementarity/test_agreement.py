@@ -43,6 +43,12 @@ def test_restitution_scales_the_distance_and_moves_no_border() -> None:
         assert elastic["distance"] == pytest.approx(2.0 * plastic["distance"], rel=1e-9, abs=1e-12)
 
 
+def test_a_touching_contact_that_is_left_approaching_is_told() -> None:
+    rows = np.array([[1.0, 0.5], [1.0, -0.5]])  # the ends of a bar, of which the second only touches
+    bar = ImpactCase(np.diag([1.0, 1.0 / 12.0]), rows[:1], np.array([-1.0, -2.0]), 0.5, touching=rows[1:])
+    assert study.compare_case(bar)["approaching"]
+
+
 @given(st.floats(-0.95, 0.95), st.floats(0.05, 1.0), st.integers(0, 1000))
 def test_two_contacts_agree_exactly_where_the_speed_ratio_exceeds_the_cosine(c: float, r: float, seed: int) -> None:
     if abs(r - c) < 1e-6:  # on the border itself rounding decides

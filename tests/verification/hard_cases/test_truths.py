@@ -70,6 +70,8 @@ def test_restitution_is_read_from_the_record_of_the_collisions() -> None:
     stronger = replace(found, v_plus=found.v_plus + 0.1 * (found.v_plus - found.v_minus))
     faulty = replace(run, impacts=stronger)
     assert restitution_residual(faulty) == pytest.approx(0.1 / 1.1)
+    weaker = replace(found, v_plus=found.v_plus - 0.1 * (found.v_plus - found.v_minus))
+    assert restitution_residual(replace(run, impacts=weaker)) == pytest.approx(0.1 / 0.9)
     assert judge_hard_case(case, "IAPB", lambda scene, world: faulty)["outcome"] == "restitution unmet"
     assert np.isnan(restitution_residual(run_in_world(case.scene, "PB")))
 

@@ -14,7 +14,8 @@ from tests.verification.laws.faults import PUSHING, newton, no_friction, returns
 from verification import check_passivity
 from verification.impacts import ImpactCase
 from verification.laws import CONTRACTS, sound_resolver
-from verification.laws.contracts import distance_from_cone
+from verification.laws.bounds import ONE_SIDED
+from verification.laws.contracts import UNILATERAL_LAWS, distance_from_cone
 
 
 @pytest.mark.parametrize(("contract", "name"), PUSHING)
@@ -39,6 +40,12 @@ def test_a_push_along_nearly_opposed_rows_is_no_pull_and_a_pull_is_one() -> None
     rows = np.abs(rng.normal(size=(3, 4)))
     pulled = -rows.sum(axis=0) / np.linalg.norm(rows.sum(axis=0))
     assert distance_from_cone(ImpactCase(np.eye(4), rows, -pulled, 0.0), pulled) == pytest.approx(1.0)
+
+
+def test_a_contact_that_is_left_approaching_slower_is_driven_in() -> None:
+    case = ImpactCase(np.eye(1), np.eye(1), np.array([-1.0]), 0.5)
+    residual = UNILATERAL_LAWS["no_penetration"].check(case, lambda M, J, v, e: 0.4 * v, ONE_SIDED)
+    assert residual is not None and not residual.passed
 
 
 def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:

@@ -37,11 +37,18 @@ def test_an_unknown_residual_never_passes() -> None:
     count = LawCount("any")
     assert [count.add(LawResidual("", value, 1.0)) for value in (0.5, np.nan, 2.0)] == [True, False, False]
     assert (count.checked, count.failures) == (3, 2) and np.isnan(count.worst.value)
+    assert ((count + count).checked, (count + count).failures) == (6, 4)  # of two workers
 
 
 def test_a_rebound_too_weak_and_one_too_strong_are_the_same_residual() -> None:
     case = ImpactCase(np.eye(1), np.eye(1), np.array([-1.0]), 0.5)
     assert [case.unmet_restitution(np.array([after])) for after in (0.25, 0.5, 0.75)] == [0.25, 0.0, 0.25]
+
+
+def test_momentum_that_appears_is_found_though_it_is_the_same_in_every_frame() -> None:
+    case = ImpactCase(np.eye(2), np.array([[1.0, -1.0]]), np.array([-1.0, 1.0]), 0.5, translations=np.ones((1, 2)))
+    residual = LAWS["momentum"].check(case, lambda M, J, v, e: v + (1.0, 0.0), KIT)
+    assert residual is not None and not residual.passed
 
 
 def test_rows_that_agree_to_noise_are_compared_up_to_that_noise() -> None:

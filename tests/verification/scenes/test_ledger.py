@@ -74,6 +74,11 @@ def test_springs_hold_what_the_static_overlap_says(runs: dict[str, Run]) -> None
     assert np.all(np.diff(series["lost damping"]) > -1e-6 * series["lost damping"][-1] - 1e-9)
 
 
+def test_a_contact_that_collides_holds_no_energy_of_a_spring(runs: dict[str, Run]) -> None:
+    run = runs["wall_1d"]
+    assert len(run.impacts.step) and not books.contact_energy(run, books.scene_of(run))[0][run.impacts.step].any()
+
+
 def test_open_books_fall_with_the_declared_order_and_a_fixed_error_does_not() -> None:
     scene = load_scene(find_scene("tumbling_body")).with_values({"integrator": "semi_implicit_euler"})
     row = books.open_row(scene, lambda refined: simulate(refined, world="IAPB"), (1, 2, 4))
