@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from iapb import recording
 from iapb.recording import Recorder, chunk_steps
-from iapb.run import Run
+from iapb.run import UNSOLVED, Run
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of
@@ -78,6 +78,13 @@ def test_parts_of_a_run_continue_each_other():
         assert np.array_equal(np.concatenate([parts[0].energy[name], *(
             part.energy[name][states:] for part in parts[1:])]), values), name
     assert np.array_equal(np.concatenate([part.impacts.mass_digest for part in parts]), whole.impacts.mass_digest)
+
+
+def test_a_resting_contact_that_was_left_unsolved_is_remarked():
+    recorder = Recorder(simulation := Simulation(load_scene(find_scene("peg_corner"))))
+    recorder.chunk(5)
+    simulation.state.rest_work.shortened[0] = 1
+    assert UNSOLVED in recorder.run("", "").remarks
 
 
 def test_time_names_and_the_rendered_force_fit_the_arrays():

@@ -135,6 +135,13 @@ def test_a_run_of_the_engine_is_certified(name: str) -> None:
     assert max(found.momentum, found.span, found.total, found.restitution) < 1e-12
 
 
+def test_impacts_of_one_step_are_each_judged_by_their_own_velocities() -> None:
+    """Both ends of the cradle are struck at once."""
+    ends = {"bodies.ball_5.position": [0.117578125, 0, 0], "bodies.ball_5.velocity": [-1, 0, 0]}
+    run = simulate(load_scene(find_scene("newton_cradle")).with_values(ends), steps=40)
+    assert run.impacts.step[0] == run.impacts.step[1] and certify(run).restitution < 1e-12
+
+
 # what is forged, and the residuals that fail; none of them gains energy but the first
 FORGED: dict[str, tuple[Callable[[Run], Run], set[str]]] = {
     "faster": (lambda run: forged(run, "impacts.v_plus", 1.0 + 1e-8), {"gains", "momentum"}),

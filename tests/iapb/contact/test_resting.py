@@ -114,6 +114,11 @@ def test_implicit_friction_creeps_below_the_stated_speed() -> None:
     assert abs(late[-1] - late[0])[0] < CREEP and sticks.friction_force[-1].any()
 
 
+def test_a_body_that_a_hand_holds_does_not_fall() -> None:
+    given = {"bodies.box.position": [0, 1, 0], "hand": {"body": "box", "force": [0, 2.0 * 9.81, 0]}}
+    assert np.ptp(simulate(on_slope(0.0, 0.5).with_values(given)).q[:, 1]) <= 1e-12
+
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize(("slope", "v"), [(20.0, 0.0), (0.0, 0.2), (20.0, -0.3)])
 def test_a_box_stops_and_sticks_under_every_integrator(integrator: str, slope: float, v: float) -> None:

@@ -33,6 +33,7 @@ CASES = [  # bodies, M constant, velocity terms
     ([SLIDE, body("spherical", "slide")], True, True),
     ([SLIDE, body("spherical", "slide", inertia=BALL)], True, False),
     ([body("spherical", center=(0.1, 0, 0))], True, True),
+    ([body("spherical", center=(0.1, 0, 0), inertia=BALL)], True, True),
     ([body("spherical", inertia=BALL)], True, False),
     ([body("free_flyer", inertia=BALL)], True, True),
     ([body("free_flyer")], True, True),
