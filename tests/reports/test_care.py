@@ -146,6 +146,14 @@ def test_garbage_is_what_no_present_code_asks_for(filled):
     assert garbage(filled) == ()
 
 
+def test_a_partial_run_is_no_garbage_where_the_finished_one_is_damaged(filled):
+    whole = runs(filled)[0]
+    partial = aged(write_run(whole.with_name(whole.name + ".partial"), read_run(whole)))
+    assert [state.path for state in garbage(filled)] == [partial]
+    whole.write_bytes(whole.read_bytes()[:-100])
+    assert garbage(filled) == ()
+
+
 def tree(folder):
     """Everything below a folder, hidden files too."""
     return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() and not path.is_symlink()

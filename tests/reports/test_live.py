@@ -131,6 +131,14 @@ def test_the_budget_grows_with_the_time_left_between_one_row_and_all_and_every_i
     assert pace.work == pytest.approx(np.percentile(work, PERCENTILES), rel=2e-3)
 
 
+def test_the_budget_learns_from_the_rows_that_were_used(lived):
+    told, simulation = [], peg()
+    budget = RowBudget(0.0, 1.0, PERIOD, simulation.system.mechanism.nv, 1)
+    budget.learn = lambda seconds, rows: told.append(rows)
+    impacts = lived(simulation, FakeClock(), budget)[0].run.impacts
+    assert sum(told) == impacts.rank.sum() < impacts.rows.sum()
+
+
 class Fails:
     """A device that works for a while."""
 

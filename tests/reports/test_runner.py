@@ -7,13 +7,15 @@ beside a run makes that run again, to the last bit.
 import os
 import shlex
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError, RunFileError
+from iapb.recording import Recorder
 from iapb.scene import find_scene, load_scene, scene_names
-from iapb.simulation import INTERRUPTED, simulate
+from iapb.simulation import INTERRUPTED, Simulation, simulate
 from reference.worlds import run_world
 from reports import cli, streaming
 from reports.evidence import exact_energy
@@ -24,7 +26,7 @@ from reports.store import RunStore, content_hash, read_run
 from reports.store.care import LEFTOVER, PARTIAL, check_store, garbage, parts_of_killed
 from reports.store.io import mark_store, sealed
 from reports.store.parts import Parts, PartsLocked, parts_of, read_parts
-from reports.store.runs import opened_run, read_entry
+from reports.store.runs import opened_run, read_entry, store_run
 from reports.uses import parsed, run_command
 from tests.reports.made_up import flipped, made_run
 from verification.check import Study
@@ -203,6 +205,13 @@ def test_a_streamed_run_stopped_or_not_has_the_content_of_one_held_in_memory(
     place, streamed = runner.stream(scene, world, resume=True)
     assert streamed.resumed_at == 512 and read_entry(place.path).content_hash == held
     assert {path.suffix for path in tmp_path.rglob("*.*")} == {".h5", ".json"}  # no part is left
+
+
+def test_what_an_earlier_piece_distrusts_is_kept(tmp_path):
+    recorder = Recorder(Simulation(PEG))
+    first, last = (recorder.chunk(PEG.steps) or recorder.take("IAPB") for _ in range(2))
+    store_run(tmp_path / "a.h5", iter([replace(first, distrust=("it sank",)), last]), key="", provenance={})
+    assert read_run(tmp_path / "a.h5").distrust == ("it sank",)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from iapb import find_scene, load_scene
 from iapb.errors import ArgumentError, IapbError, SceneError
 from reports.batches import cluster, here, processes
-from reports.store import read_table
+from reports.store import read_run, read_table
 from reports.sweeps import study as studies
 from reports.sweeps.study import (
     MAX_POINTS,
@@ -124,6 +124,12 @@ def test_a_sweep_that_was_stopped_goes_on_and_a_finished_one_computes_nothing(un
     assert outcome.reused == 4 and [damaged.name in point["note"] for point in outcome.failed] == [True]
     damaged.write_bytes(content)
     assert run_sweep(STUDY, SCENE, tmp_path).content_hash == undisturbed.content_hash
+
+
+def test_the_kinetic_energy_of_a_point_is_that_of_its_end(undisturbed):
+    point = undisturbed.points[0]
+    kinetic = read_run(undisturbed.folder / RUNS / point["file"]).energy["kinetic"]
+    assert point["kinetic_energy [J]"] == kinetic[-1] < kinetic[0]
 
 
 def test_other_values_give_another_hash_and_processes_and_a_cluster_the_same(undisturbed, tmp_path):
