@@ -181,7 +181,7 @@ class Simulation:
 
     @cached_property
     def _unwritten(self) -> Any:
-        """A record without lines, for steps that are not recorded."""
+        """A record that is never written, for steps that are not recorded."""
         return Recorder(self).blank(1)[0]
 
     def write(self, record: Any, line: int) -> None:
