@@ -42,8 +42,8 @@ $(PROJECT_STAMP): $(LOCK_STAMP)
 	@touch $@
 
 .PHONY: test
-test: setup ## ruff, mypy, import contracts and the quick tests, beside each other
-	@$(MAKE) --no-print-directory --jobs 4 lint types imports pytest
+test: setup ## ruff, mypy, import contracts, the size and the quick tests, beside each other
+	@$(MAKE) --no-print-directory --jobs 4 lint types imports nodes pytest
 
 .PHONY: reproduce
 reproduce: setup ## regenerate every figure, table and claim into out/report.html; FULL=1 for the deep version
@@ -76,6 +76,10 @@ types: setup ## mypy
 .PHONY: imports
 imports: setup ## import-linter: the packages import one way
 	@$(BIN)/lint-imports --no-logo
+
+.PHONY: nodes
+nodes: setup ## the size of each package, in nodes of the syntax tree, against its budget in pyproject.toml
+	@$(BIN)/python -m tools.nodes
 
 .PHONY: pytest
 pytest: setup ## the test suite alone; PYTEST_ARGS="-k impact" selects
