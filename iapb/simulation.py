@@ -5,8 +5,7 @@
         contacts → collisions → resting forces → move   (III-V, IV)   the law
         F_env is rendered, the device moves             (V-C, VI)   render, move_device
 
-A step has two halves, and a real device moves between them. In `begin_step` hand and coupling pull, the law advances
-and the device gets its force. In `end_step` the compiled device moves, or the position of a real device is read.
+A real device gets its force after the law has advanced. Its position is read at the end of the step.
 """
 
 from __future__ import annotations
@@ -145,12 +144,6 @@ class Simulation:
         """
         if hand_force is not None:
             self._grip(hand_force)
-        self.begin_step()
-        self.end_step()
-        return copied_step(self.system, self.state)
-
-    def begin_step(self) -> None:
-        """Do the first half of a step: apply hand and coupling, advance the law, send the device its force."""
         world, state, port = blocks = self.world, self.state, self.port
         if self._planned:
             port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
@@ -161,17 +154,13 @@ class Simulation:
             self._take(self.law.advance(self.system, state, port.applied, self.system.dt))
             self._render(*blocks)
         if self.link is not None:
-            self.link.send()
-
-    def end_step(self) -> None:
-        """Do the second half of a step: move the device or read it."""
-        if self.link is not None:
-            self.link.receive()
+            self.link.exchange()
         elif self.compiled:
             self._do(MOVE)
         elif self.port.coupling != NO_COUPLING and not self._move(self.world, self.state, self.port):
             raise IapbError(FAILURES[DEVICE_NOT_FINITE])
         self.steps_done += 1
+        return copied_step(self.system, self.state)
 
     def _do(self, part: int) -> None:
         """Do one part of a compiled step."""
@@ -183,13 +172,6 @@ class Simulation:
     def _unwritten(self) -> Any:
         """A record that is never written, for steps that are not recorded."""
         return Recorder(self).blank(1)[0]
-
-    def write(self, record: Any, line: int) -> None:
-        """Write the last step to the next line of a record, the line with the number `line`."""
-        if self.compiled:
-            self._steps(self.world, self.state, self.port, record, WRITE, self.steps_done - 1, 1)
-        else:
-            self._write(record, line, self.steps_done - 1, self.state, self.port)
 
     def _grip(self, hand_force: ArrayLike) -> None:
         if self.system.tool_tree < 0:
@@ -255,7 +237,11 @@ class Simulation:
                 self.step()
             except (IapbError, KeyboardInterrupt) as stop:
                 return k, stop
-            self.write(record, int(record.used[0]))
+            last = self.steps_done - 1
+            if self.compiled:
+                self._steps(self.world, self.state, self.port, record, WRITE, last, 1)
+            else:
+                self._write(record, int(record.used[0]), last, self.state, self.port)
         return steps, None
 
     def _plan(self, steps: int) -> tuple[int, IapbError | None]:

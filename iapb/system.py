@@ -183,7 +183,7 @@ class System:
         if _factored(state.mass_matrix, state.lower):
             raise ArgumentError("scene", scene.name, "bodies whose mass matrix is positive definite at the start")
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
-        state.row_budget[0], state.located_q[:] = d, np.nan
+        state.located_q[:] = np.nan
         return block(state)
 
     def make_port(self, coupling: Coupling, effects: Sequence[Effect] | None = None, external: bool = False) -> Any:

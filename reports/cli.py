@@ -25,7 +25,6 @@ COMMANDS = {
     "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
     "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
     "scenes": "List the scenes that come with the project: their names, and what they show.",
-    "live": "Simulate SCENE in real time, report missed deadlines, and store the run and its tick times.",
     "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
     "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
     "certify": "Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent.",
@@ -42,7 +41,7 @@ COMMANDS = {
 }  # fmt: skip
 
 GROUPS = {  # of the help, in its order
-    "Simulate": ("run", "check", "scenes", "schema", "effects", "live", "sweep"),
+    "Simulate": ("run", "check", "scenes", "schema", "effects", "sweep"),
     "Look at runs": ("inspect", "certify", "compare", "store"),
     "Verify": ("verify", "prove", "bench"),
     "The paper": ("reproduce", "report"),

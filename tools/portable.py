@@ -34,9 +34,9 @@ from reports.store.keys import hash_of, results_of
 from verification.table import titled
 
 ROOT = Path.cwd()
-# The numerical tests: all tests except those of documents, browser, live view and tools.
+# The numerical tests: all tests except those of documents, browser and tools.
 TESTS = ("tests/iapb", "tests/ordinary", "tests/reference", "tests/verification", "tests/reports",
-         "--ignore=tests/reports/test_browser.py", "--ignore=tests/reports/test_live.py")  # fmt: skip
+         "--ignore=tests/reports/test_browser.py")  # fmt: skip
 # A rigid world solves a problem by LAPACK in each step. Its rounding (1e-16 of a position) grows over some 2,000 steps
 # as contacts separate: to 1.3e-9 m at most (peg_hole_space in CBuc), and 4e-12 m in the plane. The smallest length in a
 # verdict is a penetration of 1e-4 m, ten thousand times as large as the tolerance.

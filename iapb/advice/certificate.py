@@ -226,7 +226,7 @@ def certify(run: Run) -> Certificate:
 
     found = _certificate(batches())
     total, span, restitution = np.fmax.reduce(residuals).tolist()
-    every_row = bool(np.all(run.impacts.rank[:] >= run.impacts.rows[:]))  # else a budget, which is not recorded
+    every_row = bool(np.all(run.impacts.rank[:] >= run.impacts.rows[:]))  # else some depend on others
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
     return replace(found, span=span, restitution=restitution, total=total, restitution_judged=judged)
 

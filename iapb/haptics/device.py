@@ -125,15 +125,15 @@ class DeviceLink:
         self._engage = Entry(engage)
         self._read()
 
-    def send(self) -> None:
-        """Send ``port.device_force`` to the device; a `SimulatedDevice` also gets the force of the simulated hand."""
-        if isinstance(self.device, SimulatedDevice):
-            self.device.hand_force = self._port.device_hand_force.copy()
-        self.device.apply(self._port.device_force.copy())
+    def exchange(self) -> None:
+        """Send ``port.device_force`` to the device, read it, and update the port as `move_device` does.
 
-    def receive(self) -> None:
-        """Read the device at the end of the step, then update the port as `move_device` does."""
+        A `SimulatedDevice` also gets the force of the simulated hand.
+        """
         world, state, port = self._world, self._state, self._port
+        if isinstance(self.device, SimulatedDevice):
+            self.device.hand_force = port.device_hand_force.copy()
+        self.device.apply(port.device_force.copy())
         self._read()
         port.clock[0] += 1
         if port.coupling == UNILATERAL:

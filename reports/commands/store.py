@@ -12,12 +12,10 @@ from typing import Annotated
 import typer
 
 from iapb.errors import ArgumentError
-from reports.live.replay import finish_live, is_live
 from reports.provenance import linear_algebra
 from reports.resimulate import recover, repeat_run
 from reports.show import Answer, Json, one_line, said, stage_progress
 from reports.store import care
-from reports.store.parts import are_damaged, remove_parts
 from reports.store.runs import read_provenance
 
 
@@ -81,14 +79,7 @@ def _checked(where: Path, repair: bool) -> Answer:
 def _recovered(parts: Path) -> Iterator[str]:
     """Store the complete steps in parts as a readable run, and yield a sentence about it."""
     try:
-        if not is_live(parts):
-            yield f"{recover(parts)}: what a killed run did; iapb run --resume goes on"
-            return
-        yield f"{finish_live(parts, 'killed')[0]}: what a killed live run did, with its timetable"
-        if are_damaged(parts):
-            yield f"{parts}: damaged; what is before the damage is in the run, the parts are kept"
-        else:
-            remove_parts(parts)
+        yield f"{recover(parts)}: what a killed run did; iapb run --resume goes on"
     except Exception as error:  # parts made by other software: any error is possible
         yield f"{one_line(parts)}: left as they are: {said(error, parts)}"
 

@@ -217,8 +217,7 @@ def resolve_rows(world, state, size, count):
     if unequal:
         rank, clamp, solved = resolve_unequal(world, state, size, count, e, tolerance)
     else:
-        budget = min(size, state.row_budget[0])
-        rank, clamp = factored_impact(size, count, e, tolerance, budget, True, work)
+        rank, clamp = factored_impact(size, count, e, tolerance, size, True, work)
     if world.switches.impact_friction:
         span = rank
         if unequal and solved:  # Poisson's law needs no basis of the rows, friction does

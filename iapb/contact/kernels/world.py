@@ -107,7 +107,6 @@ class State(NamedTuple):
     state_of_tree: Annotated[States, "tree"]  # FREE, COLLIDING, RESTING
     island_of_tree: Annotated[Integers, "tree"]  # first tree of its island, resolved in one impact
     collides_of_tree: Annotated[Booleans, "tree"]  # the first tree of an island that collides
-    row_budget: Annotated[Integers, "1"]  # largest number of rows used in an impact, most violated first
     spreading: Annotated[Booleans, "tree"]  # an impulse is still being spread over steps
     penalty_force: Annotated[Floats, "velocity"]  # [N, N m]
     friction_force: Annotated[Floats, "velocity"]
