@@ -53,7 +53,7 @@ def random_mechanism(
     return Mechanism(bodies)
 
 
-def random_state(rng: np.random.Generator, mechanism: Mechanism, speed: float = 1.0) -> tuple[Floats, Floats]:
-    """Return (q, v): a configuration far from neutral, and velocities of about `speed` [m/s, rad/s]."""
+def random_state(rng: np.random.Generator, mechanism: Mechanism) -> tuple[Floats, Floats]:
+    """Return (q, v): a configuration far from neutral, and velocities of about 1 [m/s, rad/s]."""
     q = mechanism.integrate(mechanism.neutral(), rng.normal(scale=2.0, size=mechanism.nv))
-    return q, rng.normal(scale=speed, size=mechanism.nv)
+    return q, rng.normal(size=mechanism.nv)

@@ -46,7 +46,7 @@ Progress = Callable[[str, int, int], None]
 SEEDS = {
     "claims": "verification.check", "properties": "verification.laws.topic",
     "proofs": "verification.proofs.numbers", "robots": "verification.mechanics.against_pinocchio",
-    "power balance": "verification.mechanics.power_balance",
+    "mass matrices": "verification.mechanics.definiteness",
     "coordinates": "verification.mechanics.coordinate_invariance",
 }  # fmt: skip
 ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since

@@ -1,4 +1,4 @@
-"""Checks of the mechanics: other coordinates (C06), a tumbling body, false collisions (C18), impacts of touching balls.
+"""Checks of the mechanics: other coordinates (C06), false collisions (C18), impacts of touching balls.
 
 The outcomes of the impacts are labelled with the changes of energy and momentum. All treatments except per-body rows
 conserve both, but their outcomes differ nevertheless, because the choice of rows decides the outcome.
@@ -53,40 +53,6 @@ def coordinate_invariance(numbers: Table) -> Drawn:
     panels = Panel(pose.svg, words, "Towards the straight arm"), Panel(bound.svg, words, "Error against bound")
     names = ("in absolute angles", "in the place of the hand", "bound")
     return Drawn(panels, numbers, zip(names, (*_LOOKS.values(), BOUND), strict=True))
-
-
-_QUANTITIES = {
-    "energy drift": ("Kinetic energy", "energy drift (relative)"),
-    "momentum drift": ("Angular momentum", "momentum drift (relative)"),
-    "attitude error": ("Attitude", "attitude error [rad]"),
-}
-INTEGRATORS = {
-    "momentum": STYLES["momentum"],
-    "semi_implicit_euler": STYLES["semi-implicit Euler"],
-    "midpoint": STYLES["midpoint"],
-    "runge_kutta_4": STYLES["Runge-Kutta 4"],
-}
-
-
-@recipe("tumbling-drift", "mechanics/tumbling")
-def tumbling_drift(numbers: Table) -> Drawn:
-    """Draw attitude error and drifts of each integrator against the step, with the declared slopes."""
-    series = [(look, numbers.where(integrator=integrator, motion="turning over").records())
-              for integrator, look in INTEGRATORS.items()]  # fmt: skip
-    panels = []
-    for column, (name, label) in _QUANTITIES.items():
-        with Plot(f"tumbling-drift-{name.split()[-1].lower()}") as plot:
-            for look, rows in series:
-                size = 5 if look.filled else 9  # so that marks which coincide are both seen
-                plot.marks([(row["step"], row[column]) for row in rows], look, markersize=size)
-                start, order = rows[0], rows[0]["declared order"]
-                plot.curve([(row["step"], start[column] * (row["step"] / start["step"]) ** order) for row in rows],
-                           LineStyle(look.color, "", BOUND.dash, 1.2))  # fmt: skip
-            plot.axes.margins(0.06)
-            plot.log("step [s]", label)
-        ends = "; ".join(f"{look.name} {rows[0][column]:.1e} to {rows[-1][column]:.1e}" for look, rows in series)
-        panels.append(Panel(plot.svg, f"{name} against the step, coarsest to finest: {ends}.", name))
-    return Drawn(panels, numbers, {look.name: look for look in INTEGRATORS.values()} | {"declared slope": BOUND})
 
 
 FILTERS = looks_of(("no filter", "coherence alone", "clustering alone", "both filters"))

@@ -74,11 +74,6 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("IAPB, RK4",), LineStyle(BLUE, ">", (4, 2), 1.2)),
     (("PB, RK4",), LineStyle(VERMILION, ">", (4, 1, 1, 1), 1.2)),
     (("PB, stiffened",), LineStyle(VERMILION, "d", (), 1.4)),
-    # integrators
-    (("momentum",), LineStyle(INK, "^")),
-    (("semi-implicit Euler",), LineStyle(MUTED, "s")),
-    (("midpoint",), LineStyle(AMBER, "^", (5, 1.6))),
-    (("Runge-Kutta 4",), LineStyle(GREEN, "D", (1.4, 1.4), filled=False)),
     # rows of an impact
     (("relative rows (12)",), LineStyle(BLUE, "D")),
     (("per-body rows (13)-(14)",), LineStyle(VERMILION, "X", (5, 1.6))),
@@ -89,7 +84,7 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
 )  # fmt: skip
 STYLES: dict[str, LineStyle] = {name: replace(look, name=name) for names, look in LOOKS for name in names}
 
-BOUND = LineStyle(INK, "", (4, 2), 1.2)  # what is measured against: a bound, a declared slope, the value before
+BOUND = LineStyle(INK, "", (4, 2), 1.2)  # what is measured against: a bound, the value before
 
 # marks of maps and tables: the outcome of a trial
 OUTCOMES: dict[str, LineStyle] = {

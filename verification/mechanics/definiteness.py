@@ -1,0 +1,50 @@
+"""The mass matrices of random trees are positive definite."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference import Floats
+from reference.random_mechanisms import random_mechanism, random_state
+from verification.check import Check, Study
+from verification.table import Row
+
+SIZES = (1, 3, 10, 30)  # joints
+MATRICES = {"quick": 150, "full": 2000}
+# Condition number of M scaled to a unit diagonal, above which rounding determines the sign of the least eigenvalue.
+LARGEST_CONDITION = 1e12
+SEED = 20050603
+
+
+def _scaled(mass: Floats) -> Floats:
+    """M scaled to a unit diagonal, which removes the units of the coordinates."""
+    scale = 1.0 / np.sqrt(np.diag(mass))
+    return mass * np.outer(scale, scale)
+
+
+def _condition(mass: Floats) -> float:
+    return float(np.linalg.cond(_scaled(mass))) if np.all(np.diag(mass) > 0.0) else np.inf
+
+
+def _definite(study: Study, joints: int) -> Row:
+    count = MATRICES[study.depth]
+    rng = np.random.default_rng([SEED, joints, 1])
+    conditions, least = [], []
+    for _ in range(count):
+        mechanism = random_mechanism(rng, joints)
+        mass = mechanism.mass_matrix(random_state(rng, mechanism)[0])
+        condition = _condition(mass) if mechanism.nv else np.inf
+        if condition <= LARGEST_CONDITION:
+            conditions.append(condition)
+            least.append(float(np.linalg.eigvalsh(_scaled(mass))[0]) * condition)
+    return {"joints": joints, "mass matrices": count, "judged, condition ≤ 1e12": len(conditions),
+            "largest condition judged": max(conditions), "least eigenvalue × condition": min(least)}  # fmt: skip
+
+
+POSITIVE_DEFINITE = Check(
+    key="positive definite", question="The mass matrix is positive definite wherever rounding permits a judgement.",
+    cases=lambda _: SIZES, row=_definite, spans=("largest condition judged", "least eigenvalue × condition"),
+    holds=lambda row: bool(row["least eigenvalue × condition"] > 0.0),
+    note="Condition and eigenvalue are those of M scaled to a unit diagonal. A row holds if all judged eigenvalues are "
+    f"positive. Above a condition of {LARGEST_CONDITION:g} rounding decides the sign, so the matrix is not judged.",
+)  # fmt: skip
