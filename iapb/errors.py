@@ -114,10 +114,9 @@ def installing(extra: str) -> str:
 #: The extra that installs a package which the engine itself does not need.
 EXTRAS = {
     **dict.fromkeys(("scipy", "h5py", "threadpoolctl", "pinocchio", "cvxpy", "clarabel", "qpsolvers", "daqp",
-                     "quadprog", "proxsuite", "quantecon"), "reference"),
-    **dict.fromkeys(("hypothesis", "sympy", "flint", "typer", "rich"), "verify"),
+                     "quadprog", "proxsuite", "quantecon", "mujoco"), "reference"),
+    **dict.fromkeys(("hypothesis", "sympy", "flint", "typer", "rich", "xarray", "h5netcdf"), "verify"),
     **dict.fromkeys(("matplotlib", "jinja2", "latex2mathml", "viser"), "report"),
-    **dict.fromkeys(("xarray", "h5netcdf"), "all"),
 }  # fmt: skip
 
 

@@ -15,14 +15,11 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from iapb.errors import MissingDependencyError
-from iapb.lazy import needed
-
 _ROOT = Path(__file__).resolve().parent.parent
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py")
 # Packages that a report compares with or uses for its proofs.
 PEERS = ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon", "sympy",
-         "python-flint", "hypothesis", "mujoco", "pybullet", "drake", "siconos")  # fmt: skip
+         "python-flint", "hypothesis", "mujoco")  # fmt: skip
 UNKNOWN = "unknown"
 NOT_INSTALLED = "not installed"
 
@@ -73,11 +70,8 @@ def _facts() -> dict[str, str]:
 def package_version(package: str) -> str:
     """Return the version of an installed package, or ``unknown``."""
     try:
-        if package != "siconos":
-            return version(package)
-        simulators = needed("reference.simulators", "The version of Siconos")
-        return str(simulators.find_simulator("siconos").version())  # it runs in the system's Python: its adapter knows
-    except (PackageNotFoundError, MissingDependencyError):
+        return version(package)
+    except PackageNotFoundError:
         return UNKNOWN
 
 

@@ -26,7 +26,6 @@ class Answer:
     impulse: Floats | None
     note: str = ""
     refused: bool = False  #: the solver does not accept this kind of problem
-    seconds: float | None = None  #: time [s] if the solver measures it itself
 
 
 @dataclass(frozen=True)

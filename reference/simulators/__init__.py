@@ -21,10 +21,6 @@ SIMULATORS: dict[str, str] = {
     "iapb": f"{_HERE}.own_engines:ImpulseAugmentedEngine",
     "rigid": f"{_HERE}.own_engines:RigidWorld",
     "mujoco": f"{_HERE}.mujoco_adapter:MuJoCo",
-    "pinocchio": f"{_HERE}.pinocchio_adapter:Pinocchio",
-    "bullet": f"{_HERE}.bullet_adapter:Bullet",
-    "drake": f"{_HERE}.drake_adapter:Drake",
-    "siconos": f"{_HERE}.siconos_adapter:Siconos",
 }
 
 

@@ -60,7 +60,7 @@ class Simulator(ABC):
             return import_module(self.module)
         except ImportError as error:
             purpose = f"The adapter of {self.package}"
-            raise MissingDependencyError(self.package, purpose, installing("peers")) from error
+            raise MissingDependencyError(self.package, purpose, installing("reference")) from error
 
     @abstractmethod
     def settings(self, scene: FixedScene, step: float | None = None) -> Settings:

@@ -1,8 +1,7 @@
-"""`iapb verify`: test an impact resolver (`--full`: with the full campaign) or an engine (`--simulator`)."""
+"""`iapb verify`: test an impact resolver; `--full`: with the full campaign."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -10,19 +9,16 @@ from typing import Annotated
 import typer
 
 from iapb.compiling import compiling_told, to_stderr
-from reference.simulators import FIXED_SCENES, SIMULATORS, find_simulator, fixed_scene
 from reports.by_name import function_named
 from reports.campaign import KEPT_PER_LAW, Campaign
 from reports.counterexamples import ENGINE, CampaignRequest, recheck_command
 from reports.counterexamples import recheck as judge_again
 from reports.show import Answer, Json, stage_progress
 from verification import check_passivity
-from verification.engines import ERRORS, MEASURES, SETTINGS, compare_engines, row_of, told, verdict
 from verification.laws import CONTRACTS
 from verification.laws.bounds import LawCount
 from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
-from verification.table import Table, table_from
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M) in tests of the engine, of any other resolver
 LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json
@@ -49,20 +45,11 @@ def verify(
     recheck: Annotated[Path | None, typer.Option(help="Judge a stored counterexample again.")] = None,
     allow_code: Annotated[bool, typer.Option(
         "--allow-code", help="With --recheck: import and call the resolver named in the file.")] = False,
-    simulator: Annotated[list[str] | None, typer.Option(
-        help="Test an engine on the fixed scenes instead: mujoco, drake, ..., all, or your adapter as module:Class; "
-             "may be repeated.")] = None,
-    scene: Annotated[list[str] | None, typer.Option(
-        help="With --simulator: only this fixed scene; may be repeated.")] = None,
     json_: Json = False,
 ) -> Answer:
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
-    if scene and not simulator:
-        raise typer.BadParameter("give an engine with --simulator", param_hint="--scene")
-    if (contract != "equality" or laws) and (full or simulator or recheck is not None):
-        raise typer.BadParameter("not with --full, --simulator or --recheck", param_hint="--contract, --laws")
-    if simulator:
-        return _simulators(simulator, scene or ())
+    if (contract != "equality" or laws) and (full or recheck is not None):
+        raise typer.BadParameter("not with --full or --recheck", param_hint="--contract, --laws")
     if recheck is not None:
         return _rechecked(recheck, allow_code)
     if full:
@@ -131,39 +118,3 @@ def _rechecked(path: Path, allow_code: bool) -> Answer:
     return Answer({"laws": laws, "passed": passed},
                   [f"  {_kept(residual.passed)} {law}: {residual.words}"
                    for law, residual in judged], int(not passed))
-
-
-def _simulators(simulators: Sequence[str], scenes: Sequence[str]) -> Answer:
-    """Run the fixed scenes in the engines; one that was asked for by name must be installed, "all" takes what is."""
-    names = list(SIMULATORS) if "all" in simulators else list(dict.fromkeys(simulators))
-    chosen = list(dict.fromkeys(scenes)) or list(FIXED_SCENES)
-    for scene in chosen:
-        fixed_scene(scene)  # a wrong name raises before anything runs
-    for name in names:
-        if ":" in name:
-            function_named("--simulator", name, "package.module:Class")
-        simulator = find_simulator(name)
-        if "all" not in simulators:
-            simulator.version()
-    with stage_progress() as progress:
-        records = compare_engines(names, chosen, progress=partial(progress, "pairs of engine and scene"))
-    present, lines = [record for record in records if not record.missing], list[str | Table]()
-    for name in names:
-        for choice in SETTINGS:
-            of_engine = [record for record in records if record.engine == name and record.choice == choice]
-            if of_engine[0].missing:
-                lines.append(f"{of_engine[0].title} is not installed here: {of_engine[0].missing}")
-                break
-            lines.append(": ".join(told(ERRORS.table_of(map(row_of, of_engine)).records())) + ".")
-    if present:
-        rows = [{"engine": one.engine, "scene": one.scene, "settings": one.choice, "law": verdict(one),
-                 **dict.fromkeys(MEASURES), **one.measures} for one in present]  # fmt: skip
-        lines += ["", table_from(rows, 2)]
-        lines += [f"{one.engine}, {one.scene}: {one.failure}" for one in present if one.failure]
-        uses: dict[str, list[str]] = {}
-        for one in present:
-            uses.setdefault(f"{one.engine}: {one.settings}", []).append(f"{one.scene} ({one.choice})")
-        lines += ["\nSettings:", *(f"  {settings}\n    in {', '.join(dict.fromkeys(used))}"
-                                   for settings, used in uses.items())]
-        lines += dict.fromkeys(f"  {one.title}: {one.note}." for one in present if one.note)
-    return Answer({"records": records}, lines)

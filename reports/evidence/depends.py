@@ -20,12 +20,11 @@ FOLDERS: dict[str, tuple[str, ...]] = {
 }
 # stage -> packages that it compares with, or leaves out where they are absent
 PACKAGES: dict[str, tuple[str, ...]] = {
-    "engines": ("mujoco", "pin", "pybullet", "drake", "siconos"),
     "mechanics": ("pin", "coal"),
     "accuracy": ("daqp", "quantecon"),
     "complementarity": ("cvxpy", "clarabel", "osqp", "scs", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon",
-                        "pin", "siconos"),
-    "haptic-rate": ("mujoco", "pybullet", "drake", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),
+                        "pin"),
+    "haptic-rate": ("mujoco", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),
 }
 
 

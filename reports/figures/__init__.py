@@ -7,7 +7,6 @@ from reports.figures import (  # noqa: F401
     corner,
     cost,
     energy_gains,
-    engine_errors,
     film,
     mechanics,
     paper,

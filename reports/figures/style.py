@@ -65,9 +65,6 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("DAQP, Python",), LineStyle(AMBER, "D", (4, 2), 1.2, filled=False)),
     # other engines
     (("MuJoCo",), LineStyle(PURPLE, "^", (6, 1.6, 1.4, 1.6))),
-    (("Drake",), LineStyle(AMBER, "v", (1.4, 1.4))),
-    (("Bullet",), LineStyle(GREEN, "P", (3, 1.2))),
-    (("Pinocchio",), LineStyle(GREEN, "D")),
     # worlds called from Python, and worlds by another integrator
     (("ideal, Python",), LineStyle(INK, "o", (), 1.6, filled=False)),
     (("IAPB, midpoint",), LineStyle(BLUE, "s", (1.4, 1.4), 1.2)),

@@ -15,7 +15,7 @@ ERRORS = [
     errors.ArgumentError("q", np.arange(3), "finite numbers"),
     errors.RangeError("energy", "too large"),
     errors.SceneError([errors.Mistake("peg.yaml", 3, 5, "bodies[0].mass", "-1", "at least 0 kg")]),
-    errors.MissingDependencyError("drake", "This comparison", "pip install drake"),
+    errors.MissingDependencyError("mujoco", "This world", "pip install mujoco"),
     errors.RunFileError("damaged"),
     errors.SolverError("refused"),
 ]

@@ -99,7 +99,7 @@ def listed(command):
 REFUSED = [  # status, command line, what the refusal says
     (2, "walk", "Usage"), (2, "run", "Usage"), (2, "", "Usage"), (2, "run peg_corner --speed 3", "No such option"),
     (2, "inspect", "Usage"), (2, "inspect run.h5 --impacts -3", "--impacts"), (2, "verify --seed -1", "--seed"),
-    (2, "verify --scene elastic_cradle", "--simulator"), (2, "verify --laws restitution --full", "not with --full"),
+    (2, "verify --laws restitution --full", "not with --full"),
     (2, "sweep corner_tilt --workers 99999999", "--workers"),
     (2, "compare --worlds PB", "give a SCENE"), (2, "compare --against PB", "give a SCENE"),
     (2, "compare --only-problems", "--problems"), (2, "store check . --delete", "only with the action gc"),
@@ -136,8 +136,6 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "verify --resolver nothing", "package.module:function"), (1, "verify --resolver no_such:f", "can be imported"),
     (1, "verify --resolver json:dumps", "resolver = 'dumps': expected a function called as (mass_matrix, con"),
     (1, "verify --resolver iapb:resolve_impct", "which has no resolve_impct; did you mean resolve_impact?"),
-    (1, "verify --simulator mujocco", "did you mean mujoco?"),
-    (1, "verify --simulator iapb --scene elastic_cradel", "did you mean elastic_cradle?"),
     *((1, f"verify --resolver {name}", said) for name, said in (
         ("omega", "resolver = 'omega'"), (":f", "resolver = ':f'"), ("json:", "resolver = 'json:'"),
         (".relative:f", "resolver"), ("'a b:c'", "resolver"), ("own_syntax:f", "SyntaxError"),

@@ -76,13 +76,6 @@ def tables():
             (method, f"1e{k}" if k < 12 else "all", gain * 10.0**k, gain * 10.0 ** (k + 10))
             for method, gain in (("factored", 0.0), ("factored, no clamp", 1e-17), ("gram_pinv, as printed", 1e-15))
             for k in range(13))),
-        "engines/errors": (
-            "engine; scene; settings; law; energy error; largest rise of energy; momentum error; overlap / size", (
-                (engine, scene, settings, law, value, value, None if law else 1e-16, value)
-                for k, (engine, law) in enumerate((("iapb (ours)", "met"), ("MuJoCo", "missed"), ("Drake", "failed"),
-                                                   ("Siconos", "not installed")))
-                for m, scene in enumerate(SCENES) for settings in ("own", "matched")
-                for value in [10.0 ** (3 * k - 16 + 2 * m) if k < 2 else None])),
         "haptic-rate/budgets": (
             "contacts; rank; budget [rows]; median residual; share of the loss; largest relative gain", (
             (6 * n, n, k, 0.5 * (1 - k / n), k / n, -0.1) for n in (4, 8, 20) for k in range(n + 1))),

@@ -150,10 +150,8 @@ def _solver(study: Study, name: str) -> Row:
 
 
 SOLVER_LIST = Check(
-    key="solvers", question="", cases=lambda study: SOLVERS, row=_solver,
-    note="Siconos is a system package and is called through the system's Python. Its time is that of its compiled "
-    "solve; the times of all others are of a call from Python.",
-)  # fmt: skip
+    key="solvers", question="", cases=lambda study: SOLVERS, row=_solver, note="Times are of a call from Python.",
+)
 
 
 # Hard cases of the catalogue with few contacts. Cases with many contacts take the slowest solvers minutes.

@@ -98,7 +98,7 @@ def hardest(races: Table) -> list[Row]:
 
 def _races_say(races: Table) -> Iterator[Part]:
     if not races.rows:
-        yield Part(f"Time of a step compared with MuJoCo: MuJoCo is not installed: {installing('peers')}.",
+        yield Part(f"Time of a step compared with MuJoCo: MuJoCo is not installed: {installing('reference')}.",
                    NOT_COMPUTED, timed=True)
     for worst in hardest(races):
         moved = worst.get(_DRIFT) or 0.0

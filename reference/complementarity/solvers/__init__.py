@@ -35,7 +35,7 @@ class SolverEntry:
 
 
 _HERE = "reference.complementarity.solvers"
-_PINOCCHIO, _SICONOS = f"{_HERE}.pinocchio_contact", "reference.siconos_bridge"
+_PINOCCHIO = f"{_HERE}.pinocchio_contact"
 
 SOLVERS: dict[str, SolverEntry] = {
     "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp", True),
@@ -54,9 +54,6 @@ SOLVERS: dict[str, SolverEntry] = {
     "cvxpy_socp": SolverEntry(f"{_HERE}.cones", "cvxpy clarabel", "interior point, fixed point", "cone", True, "socp"),
     "pinocchio_pgs": SolverEntry(_PINOCCHIO, "pinocchio", "projected Gauss-Seidel", "cone", option="PGS"),
     "pinocchio_admm": SolverEntry(_PINOCCHIO, "pinocchio", "ADMM", "cone", option="ADMM"),
-    "siconos_lemke": SolverEntry(_SICONOS, "siconos", "complementary pivoting (Lemke)", "lcp", option="LEMKE"),
-    "siconos_nsgs": SolverEntry(_SICONOS, "siconos", "nonsmooth Gauss-Seidel", "cone", option="NSGS"),
-    "siconos_newton": SolverEntry(_SICONOS, "siconos", "Alart-Curnier Newton", "cone", option="NSN_AC"),
 }  # fmt: skip
 
 
@@ -96,7 +93,7 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
         answer = Answer(None, f"{type(error).__name__}: {error}")
     seconds = time.perf_counter() - started
     impulse = None if answer.impulse is None else np.asarray(answer.impulse, dtype=np.float64)
-    return Solution(problem, impulse, solver, answer.note, answer.refused, answer.seconds or seconds)
+    return Solution(problem, impulse, solver, answer.note, answer.refused, seconds)
 
 
 def import_alone(name: str) -> ModuleType:
@@ -118,13 +115,10 @@ def _load(solver: str, entry: SolverEntry) -> Callable[..., Answer]:
     """Import now what the solver needs, so that this does not count as its time."""
     try:
         for package in entry.package.split():
-            if package != "siconos":  # of the machine's Python: `start` runs it, or says that it is missing
-                import_alone(package)
+            import_alone(package)
         module = importlib.import_module(entry.module)
     except ImportError as error:
         install = "pip install " + entry.package.replace("pinocchio", "pin")
         raise MissingDependencyError(entry.package, f"solver {solver!r}", install) from error
-    if hasattr(module, "start"):
-        module.start()
     found: Callable[..., Answer] = module.solve
     return found

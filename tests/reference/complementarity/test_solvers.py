@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from iapb.errors import ArgumentError, MissingDependencyError, SolverError
-from reference import siconos_bridge as siconos
+from iapb.errors import ArgumentError, SolverError
 from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, solver_names
 from reference.complementarity.benchmark import run_solvers
 from reference.complementarity.solution import project_on_cone
@@ -31,26 +30,12 @@ ROOT = Path(__file__).resolve().parents[3]
 REACHED = {"proxqp": 1e-5, "cvxpy_scs": 1e-5, "cvxpy_osqp": 1e-6, "cvxpy_clarabel": 1e-8}
 # quadprog and Lemke can end without an answer on exactly redundant rows, Gauss-Seidel can be too slow on
 # nearly dependent ones; their solution must then judge itself unsolved, and in a few of the SEEDS only.
-MAY_FAIL = {"quadprog", "lemke", "siconos_lemke", "gauss_seidel"}
+MAY_FAIL = {"quadprog", "lemke", "gauss_seidel"}
 SEEDS, FAILURES_ALLOWED = 12, 2
-
-
-def here() -> bool:
-    try:
-        return bool(siconos.start())
-    except MissingDependencyError:
-        return False
-
-
-def installed(names: Iterable[str]) -> list[str]:
-    """Without the solvers of the machine where it has none."""
-    return [name for name in names if SOLVERS[name].package != "siconos" or here()]
 
 
 @pytest.mark.parametrize("name", [name for name in SOLVERS if SOLVERS[name].takes != "cone"])
 def test_solvers_agree_with_enumeration_by_velocities(name: str) -> None:
-    if not installed([name]):
-        pytest.skip(f"{name}: {siconos.INSTALL}")
     failures = 0
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
@@ -100,9 +85,9 @@ def test_asymmetric_and_indefinite_matrices_are_refused_by_convex_solvers() -> N
 def test_a_problem_without_solution_is_solved_by_nobody_and_one_without_contacts_by_all() -> None:
     """w = -1 whatever p: the rows forbid what the velocity demands."""
     problem = ImpactProblem.from_delassus([[0.0]], [-1.0])
-    assert all(not solve(problem, name).solved() for name in installed(solver_names(problem)))
+    assert all(not solve(problem, name).solved() for name in solver_names(problem))
     nothing = ImpactProblem.from_impact(np.eye(2), np.zeros((0, 2)), [1.0, 2.0], 0.5)
-    for solution in (solve(nothing, name) for name in installed(solver_names(nothing))):
+    for solution in (solve(nothing, name) for name in solver_names(nothing)):
         assert solution.solved() and np.array_equal(solution.velocity_plus, [1.0, 2.0]), solution.solver
 
 
@@ -110,7 +95,7 @@ def test_two_sided_rows_are_met_by_all_that_take_them() -> None:
     """A joint and a contact on one mass: the joint holds with a negative impulse, e or not; the contact stays open."""
     rows = np.array([[1.0, 0.0], [0.6, 0.8]])
     joint = ImpactProblem.from_delassus(rows @ rows.T, rows @ [1.0, 0.5], 0.5, bilateral=[True, False])
-    taking = [name for name in installed(solver_names(joint)) if SOLVERS[name].bilateral]
+    taking = [name for name in solver_names(joint) if SOLVERS[name].bilateral]
     for solution in (solve(joint, name) for name in taking):
         assert solution.solved(1e-8), (solution.solver, solution.note, solution.residuals)
         assert solution.answer() == pytest.approx([-1.0, 0.0], abs=1e-7)
@@ -146,37 +131,6 @@ LCP, IMPACT = ImpactProblem.from_delassus, ImpactProblem.from_impact
 def test_refusals(call: Callable[[], Any], says: str) -> None:
     with pytest.raises(ArgumentError, match=says):
         call()
-
-
-@pytest.mark.parametrize("python", ["/nowhere/python3", "/bin/false"])
-def test_without_siconos_the_error_says_how_to_install_it(python: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No such Python, and one that ends without Siconos."""
-    monkeypatch.setattr(siconos, "SYSTEM_PYTHON", python)
-    monkeypatch.setattr(siconos, "_running", [])
-    with pytest.raises(MissingDependencyError, match="apt-get install python3-siconos"):
-        solve(LCP([[1.0]], [-1.0]), "siconos_lemke")
-
-
-@pytest.mark.skipif(not here(), reason=f"no Siconos in the system's Python ({siconos.INSTALL})")
-def test_siconos_answers_as_we_do_and_a_dead_process_is_a_failed_solve(monkeypatch: pytest.MonkeyPatch) -> None:
-    skew = LCP([[1.0, 2.0], [0.0, 1.0]], [-1.0, -1.5])
-    solution = solve(skew, "siconos_lemke")  # rows taken for columns would give (1, 0)
-    assert solution.solved(1e-12) and solution.answer() == pytest.approx([0.0, 1.5], abs=1e-12)
-    assert 0.0 < solution.seconds < 1.0
-    rng = np.random.default_rng(5)
-    for name in ("siconos_nsgs", "siconos_newton"):
-        problem = IMPACT(np.eye(6), rng.normal(size=(6, 6)), rng.normal(size=6), 0.0, 0.4)
-        theirs, ours = solve(problem, name), solve(problem, "nsgs")
-        assert theirs.solved(1e-8) and theirs.gamma_plus == pytest.approx(ours.gamma_plus, abs=1e-6)
-    relaxed = IMPACT(np.eye(3), np.eye(3), [-1.0, 0.3, 0.0], 0.0, 0.5, relaxed=True)
-    assert solve(relaxed, "siconos_nsgs").verdict() == "refused"
-    dead = siconos.start()
-    dead.kill()
-    dead.wait()
-    with monkeypatch.context() as patch:
-        patch.setattr(siconos, "start", lambda: dead)
-        assert solve(skew, "siconos_lemke").verdict() == "failed"
-    assert solve(skew, "siconos_lemke").solved()
 
 
 @pytest.mark.thorough
@@ -272,7 +226,7 @@ def test_solvers_agree_on_random_problems(relaxed: bool) -> None:
 
 def test_kinds_of_problems_are_refused_by_solvers_of_the_other_kind() -> None:
     names = solver_names(mass_on_a_plane([1.0, 0.0, 0.0], 0.5))
-    assert tuple(name for name in names if SOLVERS[name].package != "siconos") == CONE_SOLVERS
+    assert names == CONE_SOLVERS
     assert solve(mass_on_a_plane([-1.0, 0.0, 0.0], 0.5), "daqp").verdict() == "refused"
     assert solve(mass_on_a_plane([-1.0, 1.0, 0.0], 0.5, relaxed=True), "pinocchio_pgs").verdict() == "refused"
     assert solve(ImpactProblem.from_delassus([[1.0]], [-1.0]), "nsgs").verdict() == "refused"
