@@ -58,8 +58,8 @@ portable: setup ## tests, runs and report under other BLAS kernels, numpy, libm 
 	@$(BIN)/python -m tools.portable $(PORTABLE_ARGS) --workers $(PYTEST_WORKERS) $(if $(SETTINGS),--settings $(SETTINGS))
 
 .PHONY: fuzz
-fuzz: setup ## faults done to the store, and 100,000 wrong inputs: each is read or refused by name; TIMES=70 of what tests try
-	@IAPB_FUZZ=$(or $(TIMES),70) $(BIN)/python -m pytest -q -m '' tests/robustness/test_faults.py tests/robustness/test_fuzz.py
+fuzz: setup ## faults done to the store, and 100,000 wrong inputs: each is read or refused by name; TIMES=80 of what tests try
+	@IAPB_FUZZ=$(or $(TIMES),80) $(BIN)/python -m pytest -q -m '' tests/robustness/test_faults.py tests/robustness/test_fuzz.py
 
 .PHONY: docs
 docs: setup ## the pages of docs/ with the reference of the code, as HTML in out/docs; a warning is an error

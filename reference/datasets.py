@@ -31,7 +31,7 @@ from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from iapb.lazy import needed
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
-from reference.hdf5 import Budget, check_items, read_dataset, try_file
+from reference.hdf5 import Budget, dataset_at, group_at, values_at
 
 LARGEST_SIZE = 10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
 LARGEST_MATRIX = 1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only
@@ -156,12 +156,10 @@ def _mlcp(path: Path) -> StoredProblem:
 
 def _fclib(path: Path, allowed: int | None) -> StoredProblem:
     library = needed("h5py", "FCLIB files")
-    try_file(path)
     with library.File(path, "r") as file:
-        check_items(file)
         budget = Budget(path, file, allowed)
-        kind = "fclib_local" if "fclib_local" in file else "fclib_global"
-        group = file[kind]
+        kind = "fclib_local" if "fclib_local" in list(file) else "fclib_global"
+        group = group_at(file, kind)
         given: dict[str, Any] = {
             "restitution": 0.0, "friction": _numbers(budget, group, "vectors/mu"), "name": path.name,
             "contact_size": index(_numbers(budget, group, "spacedim", None).item())}  # fmt: skip
@@ -170,9 +168,10 @@ def _fclib(path: Path, allowed: int | None) -> StoredProblem:
         if kind == "fclib_global":
             problem = _condensed(budget, group, given)
         else:
-            w = _matrix(budget, group["W"], LARGEST_SIZE).toarray()
+            w = _matrix(budget, group_at(group, "W"), LARGEST_SIZE).toarray()
             problem = ImpactProblem.from_delassus(w, _numbers(budget, group, "vectors/q"), **given)
-        r = _numbers(budget, file, "solution/r") if "solution/r" in file else np.zeros(0)
+        solved = "solution" in list(file) and "r" in list(group_at(file, "solution"))
+        r = _numbers(budget, file, "solution/r") if solved else np.zeros(0)
         stored = r if r.any() and len(r) == problem.size else None  # zeros are a placeholder, not a solution
         return StoredProblem(problem, stored)
 
@@ -181,7 +180,8 @@ def _condensed(budget: Budget, group: Any, given: dict[str, Any]) -> ImpactProbl
     """Return a global problem with only its contacts as unknowns."""
     from scipy.sparse.linalg import splu
 
-    mass, h = _matrix(budget, group["M"], LARGEST_MATRIX), _matrix(budget, group["H"], LARGEST_MATRIX)
+    mass = _matrix(budget, group_at(group, "M"), LARGEST_MATRIX)
+    h = _matrix(budget, group_at(group, "H"), LARGEST_MATRIX)
     f, w = _numbers(budget, group, "vectors/f"), _numbers(budget, group, "vectors/w")
     if len(w) > LARGEST_SIZE or h.shape != (len(f), len(w)):
         raise ValueError(f"H {h.shape}, f {f.shape}, w {w.shape}: expected at most {LARGEST_SIZE} unknowns")
@@ -197,10 +197,10 @@ def _condensed(budget: Budget, group: Any, given: dict[str, Any]) -> ImpactProbl
 
 def _numbers(budget: Budget, group: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
     """Return a dataset of numbers as a vector; its header is checked before it is read."""
-    dataset = group[name]
+    dataset = dataset_at(group, name, budget)
     if dataset.dtype.kind not in "iuf" or dataset.size > LARGEST_SIZE**2:
         raise ValueError(f"{name}: {dataset.dtype}, {dataset.shape}: expected at most {LARGEST_SIZE**2} numbers")
-    return np.asarray(read_dataset(dataset, budget), dtype).ravel()
+    return np.asarray(values_at(group, name, budget), dtype).ravel()
 
 
 def _matrix(budget: Budget, group: Any, most: int) -> Any:

@@ -1,74 +1,24 @@
-"""Safety of HDF5 files from other people: read first by a process that may crash, and within a budget of bytes."""
+"""What iapb reads of an HDF5 file: items that a format names, stored in the file itself, within a budget of bytes.
+
+HDF5 can refer to other files: by links, as storage of a dataset, or as parts of a virtual dataset. It opens them
+without asking, so a file could show the content of any file that the user may read. Therefore a reader opens only the
+items that its format names, each by `group_at`, `dataset_at` or `values_at`, and attributes by `attribute_of`.
+"""
 
 from __future__ import annotations
 
-import os
-import resource
-from contextlib import suppress
-from functools import lru_cache
 from math import prod
 from pathlib import Path
 from typing import Any
 
-from iapb.errors import RunFileError
-
 READ_BUDGET = 1 << 29  # bytes that one file may fill; a caller may allow more
 _PER_BYTE = 64  # a large file may fill so many bytes for each of its own; a run at rest is packed forty times
-_KINDS = {1: "a soft link", 64: "a link to another file"}  # by HDF5's number of the kind; a hard link has 0
-_DEEPEST, _MOST_ITEMS = 32, 10_000  # groups in groups, and links in all; HDF5 itself crashes on very deep ones
-_PACKERS, _FILTERS = {1, 32000}, {1, 2, 3, 32000}  # deflate and lzf; also shuffle and fletcher32
+_PACKERS = {1, 32000}  # HDF5's numbers of deflate and lzf
+_FILTERS = _PACKERS | {2, 3}  # also those that shuffle bytes and add checksums
 _MOST_PACKED = 1100  # largest expansion factor: deflate makes at most 1032 bytes of one
 _UNPACKED_SMALL = 1 << 20  # bytes that any dataset may state
+_MOST_VALUES = 16  # values of an attribute
 _TEXT = 64  # bytes that Python adds to a text
-_ROWS = 1 << 20  # bytes of a piece that is read and dropped
-_SECONDS, _BYTES_PER_SECOND = 2, 1 << 20  # that reading may take of the processor: tens of times what it takes
-
-
-def try_file(path: Path) -> None:
-    """Read a file in a forked process; raise RunFileError if the HDF5 library crashes on it, or does not end.
-
-    A few wrong bytes can make the library write beyond its memory, or follow a list that has no end.
-    """
-    if path.is_file():  # else for the caller to name
-        found = path.stat()
-        if not _ends(path, found.st_ino, found.st_size, found.st_mtime_ns):
-            raise RunFileError(f"{path}: damaged or forged: the HDF5 library crashes on it, or does not end")
-
-
-@lru_cache(512)  # commands open a file several times
-def _ends(path: Path, number: int, size: int, changed: int) -> bool:
-    import h5py  # in this process, else each child would load it
-
-    child = os.fork()
-    if not child:
-        try:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            resource.setrlimit(resource.RLIMIT_CPU, (_SECONDS + size // _BYTES_PER_SECOND,) * 2)
-            with h5py.File(path) as file:
-                _read_all(file)
-        finally:
-            os._exit(0)  # what is raised, the caller meets itself
-    return not os.WIFSIGNALED(os.waitpid(child, 0)[1])
-
-
-def _read_all(file: Any) -> None:
-    """Read every attribute and every dataset, in pieces."""
-    check_items(file)
-    items = [file]
-    for item in items:
-        dict(item.attrs)
-        if hasattr(item, "values"):
-            items += item.values()
-            continue
-        with suppress(ValueError):
-            check_size(item, Budget(file.filename, file))
-            if item.dtype.hasobject or not item.shape:
-                read_dataset(item, Budget(file.filename, file))
-                continue
-            rows = max(_ROWS // max(prod(item.shape[1:]) * item.dtype.itemsize, 1), 1)
-            for first in range(0, len(item), rows):
-                item[first : first + rows]
 
 
 class Budget:
@@ -78,8 +28,12 @@ class Budget:
     """
 
     def __init__(self, path: Path | str, file: Any, allowed: int | None = None) -> None:
-        self.path, self.file_size = path, file.id.get_filesize()
-        self.allowed = self.left = max(READ_BUDGET, _PER_BYTE * self.file_size) if allowed is None else allowed
+        self.path = path
+        self.file_size = file.id.get_filesize()
+        if allowed is None:
+            allowed = max(READ_BUDGET, _PER_BYTE * self.file_size)
+        self.allowed = allowed
+        self.left = allowed
 
     def __str__(self) -> str:
         return str(self.path)
@@ -91,56 +45,109 @@ class Budget:
             raise ValueError(f"{what} asks for more than the {self.allowed} bytes that may be read (argument budget)")
 
 
-def check_items(file: Any) -> None:
-    """Raise ValueError for what a file from other people may not hold, before any value is read.
+def group_at(group: Any, name: str) -> Any:
+    """Return the group at a path below `group`.
 
-    HDF5 can refer to other files by links, as storage of a dataset, or as parts of a virtual dataset, and it opens them
-    without asking. A malicious file could thereby show the content of any file that the user may read. Groups are
-    walked level by level, because the library's own walk is recursive.
+    Raises
+    ------
+    ValueError
+        There is no such group, or a link is on the way.
     """
     import h5py
 
-    groups, count, size = [(file.id, "", 0)], 0, file.id.get_filesize()
-    _check_texts(file.id, "", size)
-    while groups:
-        group, path, depth = groups.pop()
-        links: list[tuple[bytes, int]] = []
-        group.links.iterate(lambda name, link, links=links: links.append((name, int(link.type))), info=True)
-        count += len(links)
-        if depth > _DEEPEST or count > _MOST_ITEMS:
-            raise ValueError(f"{path[:80]} and others: expected at most {_DEEPEST} groups in one another and "
-                             f"{_MOST_ITEMS} items")
-        for key, kind in links:
-            name = f"{path}/{key.decode(errors='replace')}"
-            if kind:
-                raise ValueError(f"{name} is {_KINDS.get(kind, f'a link of the kind {kind}')}: expected a file without "
-                                 "links")
-            item = h5py.h5o.open(group, key)
-            _check_texts(item, name, size)
-            if isinstance(item, h5py.h5g.GroupID):
-                groups.append((item, name, depth + 1))
-            elif isinstance(item, h5py.h5d.DatasetID):
-                _check_storage(item, name)
+    found = _item_at(group, name)
+    if not isinstance(found, h5py.Group):
+        raise ValueError(f"{name} is a dataset: expected a group")
+    return found
 
 
-def _check_texts(item: Any, name: str, size: int) -> None:
-    """Refuse an attribute of many texts: each may be the same one, as long as the file."""
+def dataset_at(group: Any, name: str, budget: Budget) -> Any:
+    """Return the dataset at a path below `group` without reading its values.
+
+    Raises
+    ------
+    ValueError
+        There is no such dataset, a link is on the way, its values are not in this file, or its size is beyond its
+        bytes or the budget.
+    """
     import h5py
 
-    for number in range(h5py.h5a.get_num_attrs(item)):
-        if h5py.h5a.get_info(item, index=number).data_size * size <= READ_BUDGET:
-            continue  # so few bytes hold few texts; to open an attribute takes ten times as long
-        attribute = h5py.h5a.open(item, index=number)
-        count, kind = prod(attribute.shape or ()), attribute.get_type().get_class()
-        long = kind in (h5py.h5t.STRING, h5py.h5t.VLEN) and attribute.name != b"DIMENSION_LIST"
-        if long and count > 1 and count * size > READ_BUDGET:
-            raise ValueError(f"{name}: an attribute of {count} texts: expected one")
+    found = _item_at(group, name)
+    if not isinstance(found, h5py.Dataset):
+        raise ValueError(f"{name} is a group: expected a dataset")
+    _check_storage(found)
+    _check_size(found, budget)
+    return found
 
 
-def _check_storage(dataset: Any, name: str) -> None:
+def values_at(group: Any, name: str, budget: Budget) -> Any:
+    """Return a dataset as an array, a text or a tuple of texts; what it fills is taken from the budget.
+
+    Raises
+    ------
+    ValueError
+        It cannot be opened (see `dataset_at`), holds neither numbers nor texts, or fills more than the budget.
+    """
     import h5py
 
-    made = dataset.get_create_plist()
+    dataset = dataset_at(group, name, budget)
+    kind = h5py.check_string_dtype(dataset.dtype)
+    if kind is None:
+        if dataset.dtype.hasobject:
+            raise ValueError(f"{dataset.name} holds neither numbers nor texts")
+        budget.take(dataset.nbytes, dataset.name)
+        return dataset[()]
+    texts = dataset.asstr()
+    if dataset.shape == ():
+        return str(texts[()])
+    if len(dataset.shape) != 1:
+        raise ValueError(f"{dataset.name} is no list of texts")
+    longest = max(kind.length or budget.file_size, 1)  # many entries may refer to one text
+    rows = max(budget.allowed // (8 * longest), 1)
+    found: list[str] = []
+    for first in range(0, len(dataset), rows):
+        piece = [str(text) for text in texts[first : first + rows]]
+        budget.take(sum(map(len, piece)) + _TEXT * len(piece), dataset.name)
+        found += piece
+    return tuple(found)
+
+
+def attribute_of(item: Any, name: str, default: Any = None) -> Any:
+    """Return an attribute of a file, group or dataset, `default` if it is absent.
+
+    Raises
+    ------
+    ValueError
+        It has more than a few values; each may be a text as long as the file.
+    """
+    if name not in item.attrs:
+        return default
+    count = prod(item.attrs.get_id(name).shape or ())
+    if count > _MOST_VALUES:
+        raise ValueError(f"the attribute {name} has {count} values: expected at most {_MOST_VALUES}")
+    return item.attrs[name]
+
+
+def _item_at(group: Any, name: str) -> Any:
+    import h5py
+
+    found = group
+    for part in name.split("/"):
+        link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
+        if link is None:
+            raise ValueError(f"{group.name.rstrip('/')}/{name} is missing")
+        if not isinstance(link, h5py.HardLink):
+            kind = "a link to another file" if isinstance(link, h5py.ExternalLink) else "a soft link"
+            raise ValueError(f"{group.name.rstrip('/')}/{name} is {kind}: expected a file without links")
+        found = found[part]
+    return found
+
+
+def _check_storage(dataset: Any) -> None:
+    import h5py
+
+    name = dataset.name
+    made = dataset.id.get_create_plist()
     if made.get_external_count():
         raise ValueError(f"{name} is stored in another file")
     if made.get_layout() == h5py.h5d.VIRTUAL:
@@ -150,47 +157,21 @@ def _check_storage(dataset: Any, name: str) -> None:
         raise ValueError(f"{name} is packed by the filters {filters}: expected gzip or lzf, once")
 
 
-def check_size(dataset: Any, budget: Budget) -> None:
+def _check_size(dataset: Any, budget: Budget) -> None:
     """Raise ValueError if a dataset states more values than its bytes can hold, or a piece exceeds the budget."""
-    stored, width, name = dataset.id.get_storage_size(), dataset.dtype.itemsize, dataset.name
+    name = dataset.name
+    stored = dataset.id.get_storage_size()
+    width = dataset.dtype.itemsize
     if dataset.shape is None:
         raise ValueError(f"{name} has no values")
     if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * stored:
         raise ValueError(f"{name} states {dataset.size} values, more than its bytes can hold")
-    pieces = [prod(dataset.shape[1:]) * width, prod(dataset.chunks or (0,)) * width]
+    largest = max(prod(dataset.shape[1:]), prod(dataset.chunks or (0,))) * width
     if dataset.compression and _MOST_PACKED * stored > budget.allowed:  # a chunk may unpack to more than it states
-        dataset.id.chunk_iter(lambda chunk: pieces.append(_MOST_PACKED * chunk.size) if _MOST_PACKED * chunk.size >
-                              pieces[-1] else None)
-    if max(pieces) > budget.allowed:
-        raise ValueError(f"a piece of {name} may fill {max(pieces)} bytes: {budget.allowed} may be read "
-                         "(argument budget)")
-
-
-def read_dataset(dataset: Any, budget: Budget) -> Any:
-    """Return a dataset as an array, a text or a tuple of texts; what it fills is taken from the budget.
-
-    Raises
-    ------
-    ValueError
-        It states more values than its bytes can hold, or fills more than the budget.
-    """
-    import h5py
-
-    check_size(dataset, budget)
-    kind = h5py.check_string_dtype(dataset.dtype)
-    if kind is None:
-        if dataset.dtype.hasobject:
-            raise ValueError(f"{dataset.name} holds neither numbers nor texts")
-        budget.take(dataset.nbytes, dataset.name)
-        return dataset[()]
-    longest = max(kind.length or budget.file_size, 1)  # many entries may refer to one text
-    texts, rows, found = dataset.asstr(), max(budget.allowed // (8 * longest), 1), list[str]()
-    if dataset.shape == ():
-        return str(texts[()])
-    if len(dataset.shape) != 1:
-        raise ValueError(f"{dataset.name} is no list of texts")
-    for first in range(0, len(dataset), rows):
-        piece = [str(text) for text in texts[first : first + rows]]
-        budget.take(sum(map(len, piece)) + _TEXT * len(piece), dataset.name)
-        found += piece
-    return tuple(found)
+        sizes: list[int] = []
+        dataset.id.chunk_iter(lambda chunk: sizes.append(chunk.size))
+        largest = max(largest, _MOST_PACKED * max(sizes, default=0))
+    if largest > budget.allowed:
+        raise ValueError(
+            f"a piece of {name} may fill {largest} bytes: {budget.allowed} may be read (argument budget)"
+        )

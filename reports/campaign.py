@@ -18,7 +18,6 @@ from typing import Any
 
 from reports.batches import here, processes
 from reports.counterexamples import CampaignRequest, keep_counterexample
-from reports.store.io import mark_store
 from reports.store.tables import read_record, write_record
 from verification.laws.bounds import LawCount, LawResidual
 from verification.laws.campaign import Batch, BatchOutcome, do_batch
@@ -32,7 +31,6 @@ class Campaign:
 
     def __init__(self, out: Path, request: CampaignRequest) -> None:
         self.request, self.folder = request, out / request.key()
-        mark_store(self.folder)
 
     def path_of(self, batch: Batch) -> Path:
         """Return the file of a batch. The name contains the batch size, as the last batch of a part may be shorter."""

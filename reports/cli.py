@@ -35,7 +35,7 @@ COMMANDS = {
     "compare": "Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files.",
     "bench": "Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula.",
     "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",
-    "store": "Check, repair and clean up the run and table files below a folder.",
+    "store": "Check the run and table files below a folder, or simulate its runs again.",
     "reproduce": "Regenerate the report; cached results are reused.",
     "report": "Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if some differ.",
 }  # fmt: skip

@@ -16,7 +16,6 @@ import numpy as np
 
 from iapb.errors import RunFileError
 from iapb.scene import scene_from_text
-from reference.hdf5 import try_file
 from reference.one_thread import one_thread
 from reference.worlds import run_world
 from reports.by_name import function_named
@@ -90,7 +89,6 @@ def read_counterexample(path: Path) -> dict[str, Any] | None:
     RunFileError
         The file is absent, damaged, or neither a run nor a counterexample.
     """
-    try_file(path)
     with opened(path, expected_format=None) as file:
         if file.attrs.get("format") == FORMAT:
             return None

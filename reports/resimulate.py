@@ -15,19 +15,13 @@ import numpy as np
 from iapb.errors import ArgumentError, RunFileError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.names import one_of
-from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import Simulation, simulate
 from iapb.worlds import find_world
-from reference.hdf5 import try_file
-from reports.store.folder import Place
-from reports.store.io import refuse_foreign
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
-from reports.store.parts import read_head
-from reports.store.runs import read_run, store_run
-from reports.streaming import joined
+from reports.store.runs import read_run
 
 # name of a law -> (module, class); any other law is taken from the world that has it
 LAWS = {
@@ -79,7 +73,6 @@ def repeat_run(path: Path | str) -> Repetition:
     ArgumentError
         The law or coupling is not one of the project's, so the file alone does not suffice to repeat the run.
     """
-    try_file(Path(path))
     stored = read_run(path)
     again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world, steps=stored.steps)
     return Repetition(content_hash(stored), content_hash(again), differences(stored, again))
@@ -150,24 +143,6 @@ def _changes(name: str, stored: np.ndarray, again: np.ndarray) -> Iterator[Chang
             return
         largest = float(np.max(np.nan_to_num(np.abs(a[~bits] - b[~bits]), nan=np.inf)))
         yield Change(name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest)
-
-
-def recover(folder: Path) -> Path:
-    """Store the steps in parts as a partial run beside them, so that they can be read; the parts stay for resuming.
-
-    Raises
-    ------
-    RunFileError
-        The parts are damaged.
-    ArgumentError
-        The law or coupling is not one of the project's.
-    """
-    head = read_head(folder)
-    place = Place(str(head.get("key", "")), folder.with_suffix(""))
-    pieces = joined(folder, Recorder(simulation_of(head)), str(head["world"]))
-    refuse_foreign(place.partial)
-    store_run(place.partial, pieces, key=place.key, stopped="killed", replace=True)
-    return place.partial
 
 
 def simulation_of(head: Mapping[str, Any]) -> Simulation:

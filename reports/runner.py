@@ -16,7 +16,6 @@ from iapb.worlds import find_world
 from reference.one_thread import one_thread
 from reports.provenance import machine_of, this_machine
 from reports.store.folder import Place, RunStore
-from reports.store.io import mark_store
 from reports.store.runs import RunEntry, read_provenance
 from reports.streaming import Stream
 from reports.uses import StoredFile, run_command
@@ -76,7 +75,6 @@ class Runner:
         place = self._place(scene, world, rendering)
         if place.path.is_file():
             return place, None
-        mark_store(self.store.folder)
         found = find_world(world, rendering)
         simulation = Simulation(scene, found.law, found.coupling_in(scene))
         with one_thread():  # as run_world does

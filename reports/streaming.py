@@ -17,7 +17,6 @@ from iapb.recording import Recorder
 from iapb.run import Run
 from iapb.simulation import Simulation, record
 from reports.store.folder import Place
-from reports.store.io import refuse_foreign, remove_unless_locked
 from reports.store.keys import code_label, plain
 from reports.store.parts import Parts, parts_of, read_head, read_parts, remove_parts
 from reports.store.runs import store_run
@@ -67,15 +66,13 @@ class Stream:
                 self.recorder.go_on(0)
                 made = joined(self.folder, self.recorder, self.world, self.parts.steps)
             target, code = (self.place.partial, "") if stopped else (self.place.path, code_label())
-            if stopped:
-                refuse_foreign(target)
             store_run(target, made, key=self.place.key, code=code, stopped=stopped, replace=bool(stopped))
             stored = not stopped
         finally:
             if self.parts is not None:
                 self.parts.close(remove=stored)
         if stored:
-            remove_unless_locked(self.place.partial)
+            self.place.partial.unlink(missing_ok=True)
             if self.parts is None and self.folder.is_dir():  # of an earlier attempt
                 remove_parts(self.folder)
         return Streamed(stopped, resumed_at, bool(stopped and self.parts and self.simulation.keeps_no_state))

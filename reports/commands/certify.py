@@ -15,9 +15,9 @@ from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
 from iapb.advice.certificate import EXPORT_HEAD, exported, exported_run
 from iapb.errors import ArgumentError, IapbError, RunFileError
-from reference.hdf5 import READ_BUDGET, try_file
+from reference.hdf5 import READ_BUDGET
 from reports.show import Answer, Json, counted, one_line, said
-from reports.store.care import is_run
+from reports.store.check import is_run
 from reports.store.io import written_aside
 from reports.store.runs import opened_run
 
@@ -92,7 +92,6 @@ def _certificate(path: Path, export: TextIO | None = None) -> Certificate:
         if export:
             export.writelines(f"{line}\n" for line in exported(*(arrays[name] for name in _GIVEN)))
         return certificate
-    try_file(path)
     with opened_run(path) as (run, _):
         certificate = certify_run(run)
         if export:

@@ -18,7 +18,6 @@ from typing import Any
 
 from reports.provenance import collect_provenance, this_machine
 from reports.runner import Runner
-from reports.store.io import mark_store
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
 from reports.store.tables import read_record, write_record
 from reports.uses import StoredFile
@@ -87,7 +86,6 @@ class Stage:
         incomplete.unlink(missing_ok=True)
         if self.failures:
             self.path = incomplete
-        mark_store(self.path.parent)
         write_record(self.path, {"runs": list(used.values()), "records": records}, f"Records of the stage {self.name}",
                      runs=tuple(used), command="iapb reproduce",
                      provenance=collect_provenance() | {SOURCES: evidence_version()})  # fmt: skip

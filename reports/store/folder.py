@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store.io import abandoned, mark_store, refuse_foreign, remove_unless_locked
 from reports.store.keys import code_label, run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
@@ -55,8 +54,6 @@ class RunStore:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunFileError(f"{self.folder}: cannot be a folder of runs: {error.strerror or error}") from error
-        for path in abandoned(self.folder):
-            remove_unless_locked(path)
 
     def place_of(self, inputs: Mapping[str, Any], label: str = "run") -> Place:
         """Return the key of `inputs`, and the file that their run has or will have.
@@ -101,12 +98,10 @@ class RunStore:
         return place.path
 
     def _keep(self, place: Place, run: Run) -> RunEntry:
-        mark_store(self.folder)
         if not run.complete:
-            refuse_foreign(place.partial)
             return store_run(place.partial, run, key=place.key, replace=True)
         entry = store_run(place.path, run, key=place.key, code=code_label(self.code))
-        remove_unless_locked(place.partial)
+        place.partial.unlink(missing_ok=True)
         return entry
 
     def entries(self) -> tuple[RunEntry, ...]:

@@ -27,11 +27,12 @@ from numpy.typing import NDArray
 
 from iapb.errors import RunFileError
 from iapb.recording import LINES
-from reports.store.io import PART_HEAD, SEAL, is_aside, is_locked, is_ours, looks_ours, sealed, written_aside
+from reports.store.io import SEAL, WRITING, sealed, written_aside
 
 PARTS_SUFFIX = ".parts"
 _LOCK = "lock"
 _FORMAT = {"format": "iapb part", "format_version": 1}
+PART_HEAD = b'{"format": "iapb part"'
 _NAME = re.compile(r"\d{8}\.part")
 _MORE, _STATE = "more", "state/"  # names of the arrays of a part that are no columns of a record
 
@@ -58,7 +59,6 @@ class Parts:
     ----------
     folder : created if it does not exist.
     head : inputs of the run, for a new one; None: go on with the parts that are there.
-    at_work : False only to remove them.
     synced : whether each part is on the disk, not only handed to the system, when it is written.
 
     Raises
@@ -67,9 +67,8 @@ class Parts:
         Another process is writing it.
     """
 
-    def __init__(self, folder: Path, head: Mapping[str, Any] | None = None, *, synced: bool = True,
-                 at_work: bool = True) -> None:
-        self.folder, self.steps, self._synced, self._at_work = folder, 0, synced, at_work
+    def __init__(self, folder: Path, head: Mapping[str, Any] | None = None, *, synced: bool = True) -> None:
+        self.folder, self.steps, self._synced = folder, 0, synced
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -87,9 +86,8 @@ class Parts:
         """Keep the first `parts` parts, which have so many steps, and remove the others; of a run at work damaged ones,
         too."""
         for path in sorted(self.folder.iterdir(), reverse=True):
-            if is_aside(path) or (_NAME.fullmatch(path.name) and int(path.stem) >= parts):
-                if is_ours(path) or (self._at_work and (looks_ours(path) or not path.lstat().st_size)):
-                    path.unlink()
+            if path.name.endswith(WRITING) or (_NAME.fullmatch(path.name) and int(path.stem) >= parts):
+                path.unlink()
         self._count, self.steps = parts, steps
 
     def write(self, record: Any, steps: int, seconds: float, more: NDArray[np.float64] | None = None,
@@ -136,22 +134,10 @@ def parts_of(path: Path) -> Path:
     return path.with_name(path.name + PARTS_SUFFIX)
 
 
-def is_parts(folder: Path) -> bool:
-    """Return whether a path is the folder of parts of a run of iapb, and no link to one."""
-    head = _path(folder, 0)
-    return folder.name.endswith(PARTS_SUFFIX) and not folder.is_symlink() and head.is_file() and looks_ours(head)
-
-
-def at_work(folder: Path) -> bool:
-    """Return whether a process is writing the parts."""
-    return is_locked(folder / _LOCK)
-
-
 def remove_parts(folder: Path) -> None:
     """Remove the parts of a run, unless a process is writing them."""
     with suppress(PartsLocked):
-        if is_ours(_path(folder, 0)):
-            Parts(folder, at_work=False).close(remove=True)
+        Parts(folder).close(remove=True)
 
 
 def read_head(folder: Path) -> Mapping[str, Any]:
@@ -178,11 +164,6 @@ def read_parts(folder: Path) -> Iterator[Part]:
         yield Part(steps, facts["used"][0], facts["seconds"], SimpleNamespace(used=facts["used"], **tables),
                    arrays[_MORE], [array for name, array in arrays.items() if name.startswith(_STATE)])
         steps, number = steps + facts["used"][0], number + 1
-
-
-def are_damaged(folder: Path) -> bool:
-    """Return whether there are more parts than can be read."""
-    return sum(1 for _ in read_parts(folder)) < sum(1 for path in folder.iterdir() if _NAME.fullmatch(path.name)) - 1
 
 
 def _path(folder: Path, number: int) -> Path:

@@ -14,12 +14,12 @@ import numpy as np
 from iapb.errors import RunFileError
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run, coordinates_of, energy_dimension, unit_of
 from iapb.schema import Quantity
-from reference.hdf5 import Budget
+from reference.hdf5 import Budget, attribute_of, dataset_at, group_at, values_at
 from reports.provenance import collect_provenance
 from reports.store import io, schema
 from reports.store.keys import content_hash, plain
 
-Reader = Callable[[Any, str, Budget], Any]  # (group, name, budget): `read_values` or `dataset_of`
+Reader = Callable[[Any, str, Budget], Any]  # (group, name, budget): `values_at` or `dataset_at`
 TIME = Quantity("time", ("time",), np.float64, "s", "")
 
 
@@ -77,7 +77,7 @@ def store_run(
                     _append(file, piece)
             file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
                                "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
-            file.attrs["content_hash"] = content_hash(_run_in(file, path, io.dataset_of))
+            file.attrs["content_hash"] = content_hash(_run_in(file, path, dataset_at))
         return _entry(file, path)
 
 
@@ -95,7 +95,8 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
     file.attrs.update({
         "format": schema.FORMAT, "format_version": schema.FORMAT_VERSION, "title": f"{run.scene_name} · {run.world}",
         "status": "complete" if run.complete else "partial", "stopped": run.stopped, "run_key": key, "code": code,
-        "dt": float(run.dt), "tool_dofs": run.tool_dofs, "tool_coordinates": run.tool_coordinates,
+        "dt": float(run.dt), "energies": json.dumps([*run.energy]),
+        "tool_dofs": run.tool_dofs, "tool_coordinates": run.tool_coordinates,
         **{name: json.dumps(getattr(run, name), ensure_ascii=False) for name in schema.SENTENCES},
     })  # fmt: skip
     for group, name, attribute in schema.TEXTS:
@@ -160,13 +161,13 @@ def read_run(path: Path | str, budget: int | None = None) -> Run:
 
 def read_stored(path: Path | str, budget: int | None = None) -> tuple[Run, RunEntry]:
     """Return the run in a file and the entry of the file; it raises the errors of `read_run`."""
-    with opened_run(path, io.read_values, budget) as found:
+    with opened_run(path, values_at, budget) as found:
         return found
 
 
 @contextmanager
 def opened_run(
-    path: Path | str, read: Reader = io.dataset_of, budget: int | None = None,
+    path: Path | str, read: Reader = dataset_at, budget: int | None = None,
 ) -> Iterator[tuple[Run, RunEntry]]:
     """Yield a run whose arrays stay in its file, to be read in `blocks`, and the entry of the file.
 
@@ -189,9 +190,9 @@ def read_provenance(path: Path | str) -> dict[str, str]:
         The file is damaged, or an entry is not a text.
     """
     with io.opened(path, expected_format=None) as file:
-        group = io.group_of(file, "provenance", path)
+        group = group_at(file, "provenance")
         budget = Budget(path, file)
-        found = {name: io.read_values(group, name, budget) for name in group}
+        found = {name: values_at(group, name, budget) for name in group}
     for name, text in found.items():
         if not isinstance(text, str):
             raise RunFileError(f"{path}: provenance/{name} is no text")
@@ -212,10 +213,10 @@ def read_entry(path: Path | str) -> RunEntry:
 
 def _entry(file: Any, path: Path | str) -> RunEntry:
     names = RunEntry._fields[1:]
-    absent = [name for name in names if name not in file.attrs]
-    if absent:
+    values = [attribute_of(file, name) for name in names]
+    if absent := [name for name, value in zip(names, values, strict=True) if value is None]:
         raise RunFileError(f"{path}: {', '.join(absent)} missing among its attributes")
-    return RunEntry(Path(path).name, *(str(file.attrs[name]) for name in names))
+    return RunEntry(Path(path).name, *map(str, values))
 
 
 def _check(run: Run) -> None:
@@ -245,34 +246,33 @@ def _check(run: Run) -> None:
 def _run_in(file: Any, path: Path | str, read: Reader, budget: int | None = None) -> Run:
     """Return the run in an open file; `read` is `read_values` (arrays in memory) or `dataset_of` (on disk)."""
     place = Budget(path, file, budget)
-    texts = {attribute: io.read_values(file[group], name, place) for group, name, attribute in schema.TEXTS}
-    tables = {group: {quantity.name: _numbers(read, file[group], quantity, place) for quantity in listed}
+    texts = {attribute: values_at(file, f"{group}/{name}", place) for group, name, attribute in schema.TEXTS}
+    tables = {group: {quantity.name: _numbers(read, file, group, quantity, place) for quantity in listed}
               for group, (listed, _) in schema.GROUPS.items()}  # fmt: skip
-    energy, effects, names = io.group_of(file, "energy", path), file["effects"], file["mechanism"]
-    lists = [io.read_values(effects, name, place) for name in ("effect", "active", "reason", "ignores")]
+    lists = [values_at(file, f"effects/{name}", place) for name in ("effect", "active", "reason", "ignores")]
+    energies = json.loads(attribute_of(file, "energies", "[]"))
     parts: dict[str, Any] = texts | {attribute: json.loads(texts[attribute]) for attribute in schema.JSON_TEXTS}
-    parts |= {name: tuple(map(str, json.loads(file.attrs.get(name, "[]")))) for name in schema.SENTENCES}
+    parts |= {name: tuple(map(str, json.loads(attribute_of(file, name, "[]")))) for name in schema.SENTENCES}
     for name in ("tool_dofs", "tool_coordinates"):
-        start, stop = file.attrs[name]
+        start, stop = attribute_of(file, name)
         parts[name] = index(start), index(stop)
     for name in ("coordinate", "velocity"):
-        parts[f"{name}_names"] = io.read_values(names, name, place)
-        parts[f"{name}_units"] = io.read_values(names, f"{name}_unit", place)
+        parts[f"{name}_names"] = values_at(file, f"mechanism/{name}", place)
+        parts[f"{name}_units"] = values_at(file, f"mechanism/{name}_unit", place)
     return Run(
-        **parts, body_names=io.read_values(names, "body", place),
+        **parts, body_names=values_at(file, "mechanism/body", place),
         **tables["trajectory"], **tables["steps"], **tables["timings"],
-        dt=float(file.attrs["dt"]), complete=file.attrs["status"] == "complete",
-        stopped=str(file.attrs.get("stopped", "")), time=_numbers(read, file["trajectory"], TIME, place),
+        dt=float(attribute_of(file, "dt")), complete=attribute_of(file, "status") == "complete",
+        stopped=str(attribute_of(file, "stopped", "")), time=_numbers(read, file, "trajectory", TIME, place),
         contacts=ContactTable(**tables["contacts"]), impacts=ImpactTable(**tables["impacts"]),
-        energy={name: _numbers(read, energy, TIME._replace(name=name), place)
-                for name in energy if "CLASS" not in energy[name].attrs},  # is_scale crashes where that is damaged,
+        energy={name: _numbers(read, file, "energy", TIME._replace(name=name), place) for name in energies},
         effects=tuple(EffectRow(name, bool(on), reason, ignored)
                       for name, on, reason, ignored in zip(*lists, strict=True)),
     )  # fmt: skip
 
 
-def _numbers(read: Reader, group: Any, quantity: Quantity, budget: Budget) -> Any:
-    values = read(group, quantity.name, budget)
+def _numbers(read: Reader, file: Any, group: str, quantity: Quantity, budget: Budget) -> Any:
+    values = read(file, f"{group}/{quantity.name}", budget)
     if not (hasattr(values, "dtype") and values.dtype.kind in "biuf" and values.ndim):
-        raise RunFileError(f"{budget}: {group.name}/{quantity.name} is no list of numbers")
+        raise RunFileError(f"{budget}: {group}/{quantity.name} is no list of numbers")
     return values.astype(np.bool_) if quantity.dtype is np.bool_ else values

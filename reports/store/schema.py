@@ -24,7 +24,8 @@ from iapb.schema import Quantity, quantities
 
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"
-FORMAT_VERSION = 4  # 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M
+# 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M; 5: names of energies
+FORMAT_VERSION = 5
 
 # group -> its quantities, and the record that holds them
 GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any]]] = {

@@ -17,7 +17,7 @@ import numpy as np
 
 from iapb.errors import RunFileError
 from iapb.names import one_of
-from reference.hdf5 import Budget
+from reference.hdf5 import Budget, attribute_of, dataset_at, group_at, values_at
 from reports.provenance import collect_provenance
 from reports.store import io
 from reports.store.keys import hash_of, plain
@@ -80,8 +80,10 @@ def read_columns(path: Path | str, name: str | None = None) -> dict[str, tuple[s
         tables = [each for each in file if each != "provenance"]
         if not tables or name not in (None, *tables):
             raise RunFileError(f"{path}: no table {name!r}: expected {one_of(str(name), tables)}")
-        group, budget = io.group_of(file, name or tables[0], path), Budget(path, file)
-        found = {key: (str(group[key].attrs["units"]), io.read_values(group, key, budget)) for key in group}
+        group, budget, found = group_at(file, name or tables[0]), Budget(path, file), dict[str, tuple[str, Any]]()
+        for key in group:
+            unit = str(attribute_of(dataset_at(group, key, budget), "units", "1"))
+            found[key] = unit, values_at(group, key, budget)
         if len({len(values) for _, values in found.values()}) > 1:
             raise RunFileError(f"{path}: the columns of the table {group.name} have different lengths")
         return found
@@ -113,5 +115,4 @@ def write_record(
 def read_record(path: Path) -> Any:
     """Return the records in a file as lists and mappings; it raises the errors of `read_columns`."""
     with io.opened(path, TABLE_FORMAT) as file:
-        text = io.read_values(io.group_of(file, RECORDS, path), "json", Budget(path, file))
-        return json.loads(text if isinstance(text, str) else text[0])  # files of earlier versions have a list of one
+        return json.loads(values_at(file, f"{RECORDS}/json", Budget(path, file)))

@@ -25,7 +25,6 @@ from reference.worlds import find_world, require_complete
 from reports.batches import Scheduler, here
 from reports.runner import run_inputs
 from reports.store.folder import RunStore
-from reports.store.io import mark_store
 from reports.store.keys import code_version
 from reports.store.tables import write_table
 from reports.sweeps.study import LAW, Point, Study, points_of
@@ -71,7 +70,6 @@ def run_sweep(
     progress : called as progress(points done, total points)
     """
     folder = Path(out).resolve() / study.name
-    mark_store(folder)
     RunStore(folder / RUNS)  # makes the folder
     points, results = list(points_of(study, str(Path(scene).resolve()))), dict[int, tuple[dict[str, Any], bool]]()
     compute = partial(compute_point, folder=str(folder / RUNS), code=code_version())

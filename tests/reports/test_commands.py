@@ -119,9 +119,7 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "run peg_corner --out /dev/null/folder", "/dev/null/folder: "),
     (1, "inspect no_such_file.h5", "no_such_file.h5: no such file"), (1, "inspect .", ".: a folder, not a file"),
     (1, "inspect notes.h5", "notes.h5"), (1, "store check ''", "argument 3 = ''"),
-    (1, "store gc notes.md", "a folder of results: gc is not for one file"),
-    (1, "store repair notes.md", "a folder of results: repair is not for one file"), (1, "store gc .", "iapb-store"),
-    *((1, f"store {action} /", "not a whole file system") for action in ("check", "repair", "gc", "again")),
+    *((1, f"store {action} /", "not a whole file system") for action in ("check", "again")),
     *((1, f"certify {name}.npz", "no archive") for name in ("text", "empty", "cut")),
     (1, "certify half.npz", "mass_matrix, v_plus missing"), (1, "certify whole.npz absent.npz --export hard", "absent"),
     *((1, f"certify whole.npz --export {name}", "--export") for name in ("whole.npz", "link.out", "hard.out", ".")),
@@ -156,7 +154,7 @@ def test_a_refusal_names_the_value_and_what_is_expected_and_changes_no_file(stat
 JSON = {  # of each row in the documents: the status, and a command
     "run": (0, "run peg_corner --set duration=0.4 --out runs"),
     "check": (3, "check peg_corner --set contact.stiffness=1e9"), "effects": (0, "effects peg_corner --world ideal"),
-    "certify": (0, "certify runs whole.npz"), "store gc": (0, "store gc runs"), "store again": (0, "store again runs"),
+    "certify": (0, "certify runs whole.npz"), "store again": (0, "store again runs"),
     "sweep": (0, "sweep two.yaml --workers 1 --out sweeps"), "compare": (0, "compare --only-problems --problems given"),
     "verify": (0, "verify --impacts 20 --laws kinetic_energy"), "prove": (0, "prove theorem_1"),
     "reproduce --figure": (0, "reproduce --figure fig02 --out figures"),
@@ -176,7 +174,7 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert found["check"]["warnings"][0].keys() == {"kind", "where", "text"}
     ignored = {one["name"]: one["ignores"] for one in found["effects"]["effects"]}
     assert ignored["penalty_stiffness"] == "stiffness"
-    assert found["store again"]["same"] == 1 == len(found["store again"]["files"]) and not found["store gc"]["removed"]
+    assert found["store again"]["same"] == 1 == len(found["store again"]["files"])
     assert len(found["sweep"]["points"]) == 2 == found["sweep"]["computed"] and Path(found["sweep"]["table"]).is_file()
     rows = {row[0]: row for row in found["compare"]["tables"]["given"]["rows"]}
     assert set(found["compare"]["tables"]) == {"given", "profile"} and "not read" in rows["bad.lcp"]
@@ -185,7 +183,6 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert [one["verdict"] for one in found["prove"]["statements"]] == ["proved"]
     drawings = found["reproduce --figure"]["drawings"]
     assert drawings and all(Path(each).is_file() for each in drawings)
-    assert set(answer("store", "repair", "runs")[1]) == {"files", "count", "logs", "aside"}
     status, whole = answer("store", "check", "runs")
     os.truncate(ran["file"], 5000)
     assert (status, set(whole), whole["count"]) == (0, {"files", "count"}, {"whole": 1})

@@ -20,11 +20,8 @@ from reference.worlds import run_world
 from reports import cli, streaming
 from reports.evidence import exact_energy
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
-from reports.resimulate import recover
 from reports.runner import Runner
 from reports.store import RunStore, content_hash, read_run
-from reports.store.care import LEFTOVER, PARTIAL, check_store, garbage, parts_of_killed
-from reports.store.io import mark_store, sealed
 from reports.store.parts import Parts, PartsLocked, parts_of, read_parts
 from reports.store.runs import opened_run, read_entry, store_run
 from reports.uses import parsed, run_command
@@ -56,18 +53,6 @@ def test_a_finished_run_is_neither_computed_again_nor_overwritten_and_a_partial_
     with pytest.raises(RunFileError, match=path.name):  # damage is reported, and left where it is
         store.get_or_run(INPUTS, pytest.fail)
     assert path.stat().st_size == 5000
-
-
-def test_what_a_killed_writer_left_aside_is_removed_once_it_is_old(tmp_path):
-    old, young, theirs = (tmp_path / name for name in (".a.h5.1.writing", ".b.h5.2.writing", ".c.odt.1.writing"))
-    for path in (old, young, theirs):
-        path.write_bytes(sealed(b'{"format": "iapb part"'))
-        os.utime(path, None if path == young else (0, 0))
-    RunStore(tmp_path)
-    assert old.exists()  # nobody has said that this is a store
-    mark_store(tmp_path)
-    RunStore(tmp_path)
-    assert not old.exists() and young.exists() and theirs.exists()
 
 
 @pytest.fixture
@@ -291,12 +276,3 @@ def test_parts_of_another_run_or_of_nobody_are_refused_and_left(killed, tmp_path
     assert not list((tmp_path / "own").iterdir())
 
 
-def test_repair_makes_what_a_killed_run_did_readable(killed, tmp_path):
-    _, scene = killed
-    assert [state.state for state in check_store(tmp_path)] == [LEFTOVER] and not garbage(tmp_path)
-    [partial] = map(recover, parts_of_killed(tmp_path))
-    assert np.array_equal(read_run(partial).q, run_world(scene_of("peg_corner", 2048), "IAPB").q)
-    assert PARTIAL in [state.state for state in check_store(tmp_path)]
-    place, streamed = Runner(tmp_path).stream(scene, "IAPB", resume=True)
-    assert streamed.resumed_at == 2048
-    assert read_entry(place.path).content_hash == content_hash(run_world(scene, "IAPB"))
