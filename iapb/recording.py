@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -21,9 +20,11 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.run import UNSOLVED, ContactTable, EffectRow, ImpactTable, Later, Run, digests
 from iapb.scene.model import SpatialScene
 from iapb.schema import Floats, Quantity, blank, quantities
+from iapb.thinning import Thinned
 
 _CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
 _ROOM = 30e6  # bytes of a record, unless one chunk is larger
+_PIECE = 16e6  # bytes of the steps that are held before they are thinned
 _BATCH = 50_000_000  # bytes of mass matrices held at once
 _STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C work at least that often
 
@@ -51,11 +52,6 @@ class Record(NamedTuple):
 def chunk_steps(contacts: int, remaining: int) -> int:
     """Return the number of steps of the next chunk."""
     return max(1, min(remaining, _STEPS_PER_CHUNK, _CONTACT_ROWS_PER_CHUNK // max(1, contacts)))
-
-
-def _line_bytes(coordinates: Coordinates, contacts: int, trees: int) -> int:
-    """Return the bytes of the lines of a step with so many contacts and trees."""
-    return sum(array.nbytes for array in make_record(1, coordinates, contacts, trees).arrays()[1:])
 
 
 def make_record(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> Any:
@@ -121,100 +117,84 @@ def _write_tables(record, step, state):
 class Recorder:
     """Collect the chunks of a running simulation and join them into a Run with poses, energies and effects.
 
-    `take` returns the chunks held so far as a Run that is a part of the whole, and releases them. The next part
-    continues from its end.
+    Parameters
+    ----------
+    simulation : in its initial state
+    every : N, to keep every N-th step of a long run (see `iapb.thinning`); its steps are thinned piece by piece
     """
 
-    def __init__(self, simulation: Any) -> None:
+    def __init__(self, simulation: Any, every: int = 1) -> None:
         self.simulation = simulation
         port, state, system = simulation.port, simulation.state, simulation.system
         self.start = {"q": state.q.copy(), "v": state.v.copy(),
                       "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
         self.coordinates = len(state.q), len(state.v), len(port.device_q), len(port.device_v)
-        self._shape = self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
-        self._line_bytes = _line_bytes(*self._shape)
-        self.chunks: list[tuple[Any, int, float]] = []  # record, steps and seconds of each chunk held
-        self.first, self.steps = 0, 0  # number of steps before those held, and number of all steps
-        self._before: dict[str, float] | None = None  # the energies at `first`
+        self.shape = self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
+        self._line_bytes = sum(array.nbytes for array in make_record(1, *self.shape).arrays()[1:])
+        self.records: list[Any] = []  # of the steps held
+        self.timings: list[tuple[int, float]] = []  # steps and seconds of each chunk
+        self.first = 0  # number of steps before those held
+        self.steps = 0  # number of all steps done
+        self._thinned = Thinned(every) if every > 1 else None
+        self._before: dict[str, float] = {}  # the energies at `first`
         self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = None  # state and energy of the whole run
 
     @property
-    def records(self) -> list[Any]:
-        """The records of the chunks held, each once."""
-        return list({id(record): record for record, _, _ in self.chunks}.values())
-
-    @property
     def bytes_per_step(self) -> int:
-        """Bytes that a step without contacts adds to a run: lines (twice, for joining) and energies."""
-        return 2 * _line_bytes(self.coordinates, 0, 0) + 8 * len(FORCES) + 40
-
-    @property
-    def held_bytes(self) -> int:
-        """Memory of the steps held [bytes]."""
-        return (self.steps - self.first) * self._line_bytes
+        """Bytes that a kept step without contacts adds to a run: lines (twice, for joining) and energies."""
+        lines = make_record(1, self.coordinates, 0, 0).arrays()[1:]
+        return 2 * sum(array.nbytes for array in lines) + 8 * len(FORCES) + 40
 
     def chunk(self, total: int) -> BaseException | None:
-        """Simulate and keep the next chunk; return the exception that stopped it early, if any."""
+        """Simulate and record the next chunk; return the exception that stopped it early, if any."""
+        if self._thinned and (self.steps - self.first) * self._line_bytes > _PIECE:
+            self._thin("", "", last=False)
         size = chunk_steps(self.simulation.system.capacity, total - self.steps)
-        record = self.chunks[-1][0] if self.chunks else None
-        if record is None or len(record.steps.q) < record.used[0] + size:
+        if not self.records or len(self.records[-1].steps.q) < self.records[-1].used[0] + size:
             room = int(_ROOM / max(1, self._line_bytes))
-            record = make_record(max(size, min(total - self.steps, room)), *self._shape)
+            self.records.append(make_record(max(size, min(total - self.steps, room)), *self.shape))
         if self.steps == 0:
             self.simulation.prepare()  # so that only steps are timed
         started = time.perf_counter()
-        done, stop = self.simulation.advance_chunk(record, size)
-        self.keep(record, done, time.perf_counter() - started)
+        done, stop = self.simulation.advance_chunk(self.records[-1], size)
+        self.timings.append((done, time.perf_counter() - started))
+        self.steps += done
         return stop
 
-    def blank(self, total: int) -> tuple[Any, int]:
-        """Return a record of its own for the next chunk, and its number of steps; the whole run has `total` steps."""
-        size = chunk_steps(self.simulation.system.capacity, total - self.steps)
-        return make_record(size, *self._shape), size
+    def run(self, world: str, stopped: str) -> Run:
+        """Return the recorded steps as a Run; `stopped` says why it is incomplete, empty if it is complete."""
+        if self._thinned:
+            return self._thinned.run(self._thin(world, stopped, last=True))
+        return self._held(world, stopped)
 
-    def keep(self, record: Any, steps: int, seconds: float) -> None:
-        """Keep a record with `steps` new lines, which took `seconds` to simulate."""
-        self.chunks.append((record, steps, seconds))
-        self.steps += steps
+    def _thin(self, world: str, stopped: str, last: bool) -> Run:
+        """Thin and release the steps held; return them as a run."""
+        piece = self._held(world, stopped)
+        ledger = self._ledger(piece)
+        vars(piece)["energy"] = _shown(ledger, piece)
+        at_first = {name: getattr(piece, name)[0].copy() for name in ("q", "v")}
+        energy_at_first = {name: piece.energy[name][0] for name in ("kinetic", "potential")}
+        self._thinned.add(piece, self.first, self._before, last)
+        self._at_first = self._at_first or (at_first, energy_at_first)
+        self._before = last_of(ledger, self._before)
+        self.start = {each.name: getattr(piece, each.name)[-1].copy() for each in STATES}
+        self.records, self.first = [], self.steps
+        return piece
 
-    def held(self) -> list[tuple[Any, int, float]]:
-        """Return the records held, each with its steps and the seconds that they took."""
-        return [(record, int(record.used[0]), sum(seconds for each, _, seconds in self.chunks if each is record))
-                for record in self.records]
-
-    def forget(self) -> None:
-        """Release all chunks, after the caller has stored them."""
-        self.chunks, self.first = [], self.steps
-
-    def go_on(self, steps: int) -> None:
-        """Continue the count from a number of steps that were done and stored before."""
-        self.first = self.steps = steps
-
-    def joined(self, lines: str, before: Mapping[str, np.ndarray] | None = None) -> dict[str, Any]:
-        """Return copies of the columns of `steps`, `contacts` or `impacts` over all records, a line `before` first."""
-        number, first = list(LINES).index(lines), before or {}
+    def _joined(self, lines: str) -> dict[str, Any]:
+        """Return copies of the columns of `steps`, `contacts` or `impacts` over all records; states from the start."""
+        number = list(LINES).index(lines)
+        first = self.start if lines == "steps" else {}
         return {each.name: np.concatenate([
             *([first[each.name][None]] if each.name in first else []),
             *(getattr(getattr(record, lines), each.name)[: record.used[number]] for record in self.records)])
             for each in LINES[lines]}
 
-    def take(self, world: str) -> Run:
-        """Return and release everything held, as a part of a run; the next part starts at its end."""
-        part = self.run(world, "")
-        ledger = self._ledger(part)
-        vars(part)["energy"] = _shown(ledger, part)
-        self._at_first = self._at_first or ({name: getattr(part, name)[0].copy() for name in ("q", "v")},
-                                            {name: part.energy[name][0] for name in ("kinetic", "potential")})
-        self._before = last_of(ledger, self._before)
-        self.start = {each.name: getattr(part, each.name)[-1].copy() for each in STATES}
-        self.forget()
-        return part
-
-    def run(self, world: str, stopped: str) -> Run:
-        """Return everything held as a Run; `stopped` says why it is incomplete, empty if it is complete."""
+    def _held(self, world: str, stopped: str) -> Run:
+        """Return the steps held as a Run."""
         simulation, system = self.simulation, self.simulation.system
         law, coupling, scene, mechanism = simulation.law, simulation.coupling, simulation.scene, system.mechanism
-        steps, impacts = self.joined("steps", self.start), self.joined("impacts")
+        steps, impacts = self._joined("steps"), self._joined("impacts")
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
         struck = steps["q"][impacts["step"] - self.first]
         ledger, planar = self._ledger, not isinstance(scene, SpatialScene)
@@ -233,11 +213,11 @@ class Recorder:
             velocity_names=mechanism.velocity_names, velocity_units=mechanism.velocity_units,
             body_names=mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
             time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **steps,
-            contacts=ContactTable(offsets, **self.joined("contacts")),
+            contacts=ContactTable(offsets, **self._joined("contacts")),
             impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, struck)),
             effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores) for one in simulation.effects),
-            chunk_steps=np.array([steps for _, steps, _ in self.chunks], np.int64),
-            chunk_seconds=np.array([seconds for _, _, seconds in self.chunks], np.float64),
+            chunk_steps=np.array([steps for steps, _ in self.timings], np.int64),
+            chunk_seconds=np.array([seconds for _, seconds in self.timings], np.float64),
             kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=remarks, **later,
         )
 

@@ -157,6 +157,7 @@ class Run:
     remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene, such as by contact.auto
     # why the result is not to be trusted (`iapb.advice.distrust`); empty if nothing is wrong
     distrust: tuple[str, ...] = field(default_factory=tuple)  # no default of the class, which would hide a Later
+    every: int = 1  # N: of a long run, every N-th step is recorded, and each step with an impact (`iapb.thinning`)
 
     def __post_init__(self) -> None:
         """Set the attributes aside that are computed at first use."""
@@ -178,8 +179,13 @@ class Run:
 
     @property
     def steps(self) -> int:
-        """Number of steps done."""
+        """Number of steps recorded."""
         return len(self.time) - 1
+
+    @property
+    def steps_done(self) -> int:
+        """Number of steps done; more than those recorded if the record is thinned."""
+        return self.steps if self.every == 1 else round(float(self.time[-1]) / self.dt)
 
     def __repr__(self) -> str:
         """Return the summary, and the first reason for distrust if there is one."""
@@ -191,7 +197,8 @@ class Run:
         """Scene, world, steps, impacts and penetration on one line."""
         end = "" if self.complete else f", stopped: {self.stopped}"
         deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
-        return (f"{self.scene_name} in {self.world}: {self.steps} steps of {1e3 * self.dt:.4g} ms{end}, "
+        kept = "" if self.every == 1 else f" ({self.steps} recorded)"
+        return (f"{self.scene_name} in {self.world}: {self.steps_done} steps of {1e3 * self.dt:.4g} ms{kept}{end}, "
                 f"{len(self.impacts.step)} impacts, penetration at most {1e3 * deepest:.3g} mm")
 
     def _repr_html_(self) -> str:

@@ -31,7 +31,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
 from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
-from iapb.recording import Recorder, write_step
+from iapb.recording import Recorder, make_record, write_step
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import wrench_of
@@ -112,16 +112,6 @@ class Simulation:
         self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
 
-    def arrays(self) -> list[np.ndarray]:
-        """Return all arrays that a step may change, in a fixed order; a simulation resumes from copies of them."""
-        return [*self.state.arrays(), *self.port.arrays()]
-
-    @property
-    def keeps_no_state(self) -> bool:
-        """Whether the next step depends on `arrays` alone: no external device, and no law with a state of its own."""
-        frozen = getattr(getattr(self.law, "__dataclass_params__", None), "frozen", False)
-        return self.link is None and (self.compiled or bool(frozen))
-
     @property
     def time(self) -> float:
         """Simulated time [s]."""
@@ -171,7 +161,7 @@ class Simulation:
     @cached_property
     def _unwritten(self) -> Any:
         """A record that is never written, for steps that are not recorded."""
-        return Recorder(self).blank(1)[0]
+        return make_record(1, *Recorder(self).shape)
 
     def _grip(self, hand_force: ArrayLike) -> None:
         if self.system.tool_tree < 0:
@@ -217,11 +207,13 @@ class Simulation:
         self._write.taking(self._unwritten, 0, 0, state, port)
         if self.link is None and port.coupling != NO_COUPLING:
             self._move.taking(*blocks)
-        if self.keeps_no_state:  # a law in Python takes a first step, which is then undone
-            before = [array.copy() for array in self.arrays()]
+        frozen = getattr(getattr(self.law, "__dataclass_params__", None), "frozen", False)
+        if frozen and self.link is None:  # a law in Python without a state of its own takes a first step, then undone
+            arrays = [*self.state.arrays(), *self.port.arrays()]
+            before = [array.copy() for array in arrays]
             with suppress(IapbError):  # the first step will say so
                 self.step()
-            for array, values in zip(self.arrays(), before, strict=True):
+            for array, values in zip(arrays, before, strict=True):
                 array[...] = values
             self.steps_done = 0
 
@@ -256,7 +248,7 @@ class Simulation:
 
 
 def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
-             world: str = "", steps: int | None = None,
+             world: str = "", steps: int | None = None, every: int = 1,
              progress: Callable[[int, int], None] | None = None, max_memory: float | None = None) -> Run:
     """Simulate a scene in a named world, or with a contact law and a coupling, and return the run.
 
@@ -268,6 +260,8 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
         scene's gains; default: IAPB, as in `iapb run`. If `law` is given, it is only a name for the record; default
         then: the names of law and coupling.
     steps : number of steps, at least 1; default: the scene's duration times its rate.
+    every : N thins the record: it keeps every N-th step, each step with an impact, all impacts and the state at the
+        end. Energies and distrust are those of all steps. For runs whose record would not fit in memory.
     progress : called as progress(steps done, total steps) after every chunk.
     max_memory : largest size of the record [bytes]; ``math.inf`` for no limit; default: half of the machine's memory.
 
@@ -287,6 +281,7 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     for name, value, fine, expected in (
         ("world", world, isinstance(world, str), "the name of a world, as text"),
         ("steps", steps, steps is None or _is_positive(steps, Integral), "a whole number >= 1"),
+        ("every", every, _is_positive(every, Integral), "a whole number >= 1"),
         ("progress", progress, progress is None or callable(progress), "a function of the steps done and the total"),
         ("max_memory", max_memory, max_memory is None or _is_positive(max_memory, Real),
          "a number of bytes > 0; math.inf for no limit"),
@@ -301,8 +296,8 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
         law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
     simulation = Simulation(system_of(scene), law, coupling)
     total = simulation.scene.steps if steps is None else int(steps)
-    recorder = Recorder(simulation)
-    _check_memory(recorder.bytes_per_step, total, max_memory)
+    recorder = Recorder(simulation, int(every))
+    _check_memory(recorder.bytes_per_step, total, int(every), max_memory)
     with compiling_told(to_stderr):
         stopped = record(recorder, total, progress)
         return recorder.run(world, stopped)
@@ -325,11 +320,10 @@ def _scene_of(path: Path, text: bytes) -> Scene:
     return load_scene(path)
 
 
-def record(recording: Recorder, total: int, progress: Callable[[int, int], None] | None = None,
-           between: Callable[[], None] | None = None) -> str:
+def record(recording: Recorder, total: int, progress: Callable[[int, int], None] | None = None) -> str:
     """Simulate up to `total` steps, chunk by chunk; return why the run stopped early, or "" if it did not.
 
-    progress : see `simulate`; between : called between two chunks.
+    progress : see `simulate`.
 
     Raises
     ------
@@ -342,8 +336,6 @@ def record(recording: Recorder, total: int, progress: Callable[[int, int], None]
             stop = recording.chunk(total)
             if progress is not None:
                 progress(recording.steps, total)
-            if between is not None and stop is None and recording.steps < total:
-                between()
     except KeyboardInterrupt as interrupt:
         stop = interrupt
     if stop is not None and recording.steps == 0:
@@ -352,16 +344,19 @@ def record(recording: Recorder, total: int, progress: Callable[[int, int], None]
     return "" if recording.steps == total else why
 
 
-def _check_memory(each: int, steps: int, most: float | None) -> None:
-    """Raise an ArgumentError if the steps take more than `most` bytes; default: half of the machine's memory."""
+def _check_memory(each: int, steps: int, every: int, most: float | None) -> None:
+    """Raise an ArgumentError if the kept steps take more than `most` bytes; default: half of the machine's memory."""
     if most is None:
         most = 4e9  # if the system does not report it
         with suppress(AttributeError, ValueError, OSError):
             most = 0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if steps * each > most:
-        raise ArgumentError("steps", steps, f"at most {int(most / each):,}: the record takes {each} bytes a step and "
-                            f"more with contacts, {_bytes(steps * each)} in all, of {_bytes(most)} that it may take. "
-                            "max_memory=math.inf takes the limit away; a lower rate or shorter parts take less")
+    size = -(-steps // every) * each
+    if size > most:
+        fits = -(-steps * each // max(int(most), 1))
+        raise ArgumentError("steps", steps, f"at most {int(most / each) * every:,}: the record takes {each} bytes a "
+                            f"step and more with contacts, {_bytes(size)} in all, of {_bytes(most)} that it may take. "
+                            f"every={fits} (iapb run --every {fits}) keeps one step of {fits} and fits; "
+                            "max_memory=math.inf takes the limit away")
 
 
 def _bytes(count: float) -> str:

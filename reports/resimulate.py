@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from iapb.errors import ArgumentError, RunFileError
+from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.reading import scene_from_values
-from iapb.simulation import Simulation, simulate
+from iapb.simulation import simulate
 from iapb.worlds import find_world
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
 from reports.store.runs import read_run
@@ -74,7 +73,8 @@ def repeat_run(path: Path | str) -> Repetition:
         The law or coupling is not one of the project's, so the file alone does not suffice to repeat the run.
     """
     stored = read_run(path)
-    again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world, steps=stored.steps)
+    again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world,
+                     steps=stored.steps_done, every=stored.every)
     return Repetition(content_hash(stored), content_hash(again), differences(stored, again))
 
 
@@ -143,13 +143,3 @@ def _changes(name: str, stored: np.ndarray, again: np.ndarray) -> Iterator[Chang
             return
         largest = float(np.max(np.nan_to_num(np.abs(a[~bits] - b[~bits]), nan=np.inf)))
         yield Change(name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest)
-
-
-def simulation_of(head: Mapping[str, Any]) -> Simulation:
-    """Return the simulation of parts in its initial state."""
-    lacking = [name for name in ("scene_resolved", "scene_source", "world", "law", "law_settings", "coupling",
-                                 "coupling_settings") if name not in head]
-    if lacking:
-        raise RunFileError(f"the first part does not name {', '.join(lacking)}")
-    run: Any = SimpleNamespace(**head)  # it has the names of a Run's
-    return Simulation(scene_of(run), law_of(run), coupling_of(run))

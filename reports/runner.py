@@ -11,13 +11,12 @@ from typing import Any
 
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.simulation import Simulation, require_complete, simulate
+from iapb.simulation import require_complete, simulate
 from iapb.worlds import find_world
 from reference.one_thread import one_thread
 from reports.provenance import machine_of, this_machine
 from reports.store.folder import Place, RunStore
 from reports.store.runs import RunEntry, read_provenance
-from reports.streaming import Stream
 from reports.uses import StoredFile, run_command
 
 Progress = Callable[[int, int], None]
@@ -41,7 +40,7 @@ class Runner:
         self._held: dict[str, tuple[Run, RunEntry]] = {}
         self._known: dict[str, StoredFile] = {}
         self._made_here: set[str] = set()
-        self._places: dict[tuple[int, str, str], tuple[Place, Scene]] = {}
+        self._places: dict[tuple[int, str, str, int], tuple[Place, Scene]] = {}
 
     def __call__(
         self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True, partial: bool = False
@@ -51,14 +50,11 @@ class Runner:
         An incomplete run is stored as partial. Then the error that stopped it is raised; with `partial` the run is
         returned instead.
         """
-        place = self._place(scene, world, rendering)
+        place = self.place_of(scene, world, rendering)
         name = place.path.name
         if not place.path.is_file():
             self._made_here.add(name)
-        found = find_world(world, rendering)
-        compute = given(one_thread()(simulate), scene, found.law, found.coupling_in(scene),
-                        world=_label(world, rendering), progress=self.progress)
-        run, entry = self._held.get(name) or self.store.fetch(place, compute)
+        run, entry = self._held.get(name) or self.fetch(scene, world, rendering)
         if keep and run.complete:
             self._held[name] = run, entry
         if not partial:
@@ -67,19 +63,15 @@ class Runner:
         self.use_again(scene, world, rendering)
         return run
 
-    def stream(self, scene: Scene, world: str, rendering: str = "full", *, resume: bool = False) -> tuple[Place, Any]:
-        """Simulate and store a run in constant memory; return its place and the outcome, None if the run exists.
+    def fetch(self, scene: Scene, world: str, rendering: str = "full", every: int = 1) -> tuple[Run, RunEntry]:
+        """Read or compute a run, which may be partial; return it with the entry of its file.
 
-        resume : continue, bit for bit, from the parts that a stopped or killed process left.
+        every : keep every N-th step (see `iapb.simulation.simulate`).
         """
-        place = self._place(scene, world, rendering)
-        if place.path.is_file():
-            return place, None
         found = find_world(world, rendering)
-        simulation = Simulation(scene, found.law, found.coupling_in(scene))
-        with one_thread():  # as run_world does
-            streamed = Stream(place, simulation, _label(world, rendering), scene.steps)
-            return place, streamed.run(resume, self.progress)
+        compute = given(one_thread()(simulate), scene, found.law, found.coupling_in(scene),
+                        world=_label(world, rendering), every=every, progress=self.progress)
+        return self.store.fetch(self.place_of(scene, world, rendering, every), compute)
 
     @contextmanager
     def recording(self, user: str) -> Iterator[dict[str, StoredFile]]:
@@ -110,13 +102,14 @@ class Runner:
 
     def file_of(self, scene: Scene, world: str, rendering: str = "full") -> str:
         """Return the name of the file of a run."""
-        return self._place(scene, world, rendering).path.name
+        return self.place_of(scene, world, rendering).path.name
 
-    def _place(self, scene: Scene, world: str, rendering: str) -> Place:
-        asked = id(scene), world, rendering
+    def place_of(self, scene: Scene, world: str, rendering: str = "full", every: int = 1) -> Place:
+        """Return the place of a run."""
+        asked = id(scene), world, rendering, every
         if asked not in self._places:  # a key costs a millisecond; the scene is held, so that its id stays its own
             found = find_world(world, rendering)
-            inputs = run_inputs(scene, found.law, found.coupling_in(scene), world)
+            inputs = run_inputs(scene, found.law, found.coupling_in(scene), world, every)
             self._places[asked] = self.store.place_of(inputs, self.label(scene, world, rendering)), scene
         return self._places[asked][0]
 
@@ -141,9 +134,10 @@ def _label(world: str, rendering: str) -> str:
     return world if rendering == "full" else f"{world} {rendering}"
 
 
-def run_inputs(scene: Scene, law: Any, coupling: Any, world: str) -> dict[str, Any]:
+def run_inputs(scene: Scene, law: Any, coupling: Any, world: str, every: int = 1) -> dict[str, Any]:
     """Return everything that determines a run, besides the code."""
     return {
         "scene": scene.resolved(), "law": law.name, "law settings": dict(law.settings),
         "coupling": coupling.name, "coupling settings": dict(coupling.settings), "world": world,
+        "every": every,
     }  # fmt: skip

@@ -13,7 +13,6 @@ import typer
 from iapb.advice.checks import check_scene
 from iapb.advice.effects import ignored_fields
 from iapb.compiling import to_stderr
-from iapb.errors import RunFileError
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.simulation import INTERRUPTED
@@ -22,8 +21,6 @@ from iapb.worlds import find_world
 from reports.runner import Runner
 from reports.show import Answer, Json, counted, duration, one_line, stage_progress
 from reports.store.io import blocks
-from reports.store.parts import parts_of
-from reports.store.runs import opened_run
 from reports.uses import parsed
 
 SceneName = Annotated[str, typer.Argument(
@@ -51,14 +48,14 @@ def run(
                                             "IAPB-push: contacts only push.")] = "IAPB",
     rendering: Rendering = "full",
     set_: Values = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was stopped or killed.")] = False,
+    every: Annotated[int, typer.Option(min=1, help="Record every N-th step only; a long run takes less memory.")] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
     json_: Json = False,
 ) -> Answer:
     """Simulate SCENE and store the run as HDF5. An existing run is reused.
 
     Prints the warnings of iapb check first. Ends with status 3 if the result is not to be trusted.
-    Memory does not grow with the number of steps. A killed run can be resumed.
+    Ctrl-C keeps the steps done, in a file that ends in .partial.
     """
     source, runner = scene_given(scene, set_), Runner(out)
     law = find_world(world, rendering).law
@@ -67,29 +64,21 @@ def run(
         to_stderr(f"{source.name} in {world}: {said}.")
     for caution in cautions:
         to_stderr(f"Warning: {caution}.")
-    left = parts_of(out / runner.file_of(source, world, rendering))
-    if left.is_dir() and not resume:
-        to_stderr(f"Warning: {left}, of a run that was stopped, is given up; --resume goes on with it.")
+    place = runner.place_of(source, world, rendering, every)
+    existed = place.path.is_file()
     stage = f"{source.name} in {world}: steps"
     with stage_progress(stage, transient=True) as progress:
         runner.progress = partial(progress, stage)
-        place, streamed = runner.stream(source, world, rendering, resume=resume)
-    stopped = "" if streamed is None else streamed.stopped
-    with opened_run(place.partial if stopped else place.path) as (result, entry):
-        if entry.run_key != place.key:
-            raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
-        file = place.path if result.complete else place.partial
-        lines = [*describe(result, existed=streamed is None), f"Stored in {one_line(file)}"]
-        if not result.complete:
-            lines[-1] = f"Stopped: {result.stopped}. The {result.steps} steps done are readable in {one_line(file)}"
-        if streamed is not None and streamed.resumed_at:
-            lines.insert(0, f"Resumed after {streamed.resumed_at} steps.")
-        elif streamed is not None and resume:
-            lines.insert(0, "Nothing to resume: computed from the start.")
-        if streamed is not None and streamed.resumable:
-            lines.append("Go on with the same command and --resume.")
-        status = (130 if stopped == INTERRUPTED else 1) if stopped else DISTRUSTED if result.distrust else 0
-        return Answer(run_as_json(result) | {"warnings": cautions, "file": file}, lines, status)
+        result, _ = runner.fetch(source, world, rendering, every)
+    file = place.path if result.complete else place.partial
+    lines = list(describe(result, existed))
+    if result.complete:
+        lines.append(f"Stored in {one_line(file)}")
+        status = DISTRUSTED if result.distrust else 0
+    else:
+        lines.append(f"Stopped: {result.stopped}. The {result.steps_done} steps done are readable in {one_line(file)}")
+        status = 130 if result.stopped == INTERRUPTED else 1
+    return Answer(run_as_json(result) | {"warnings": cautions, "file": file}, lines, status)
 
 
 def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
@@ -108,8 +97,9 @@ def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
 def run_as_json(run: Run) -> dict[str, Any]:
     """Return the summary of a run as plain values."""
     return {
-        "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling, "steps": run.steps,
-        "dt": run.dt, "complete": run.complete, "stopped": run.stopped, "collisions": len(run.impacts.step),
+        "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling,
+        "steps": run.steps_done, "every": run.every, "dt": run.dt,
+        "complete": run.complete, "stopped": run.stopped, "collisions": len(run.impacts.step),
         "deepest_penetration": deepest(run),
         "end": dict(zip(run.coordinate_names, run.q[-1].tolist(), strict=True)),
         "ignores": ignored_fields(run.effects), "remarks": run.remarks, "distrust": run.distrust,
@@ -127,8 +117,10 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
     said = f"; ignores {', '.join(ignored)}" if ignored else ""
     yield f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}{said}."
     how = "read from its file; it had taken" if existed else "computed in"
-    yield (f"{run.steps} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
-           f"({duration(seconds / max(run.steps, 1))} a step).")
+    yield (f"{run.steps_done} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
+           f"({duration(seconds / max(run.steps_done, 1))} a step).")
+    if run.every > 1:
+        yield f"Recorded are {run.steps} of them: one of {run.every}, and those with an impact."
     if len(impacts.step):
         lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
         most = max(int(block.max()) for block in blocks(impacts.rows))

@@ -79,7 +79,7 @@ def _state(path: Path) -> FileState:
         if kind == FORMAT:
             with opened_run(path) as (run, _):
                 if not run.complete or path.name.endswith(PARTIAL_SUFFIX):
-                    return FileState(path, PARTIAL, f"{run.steps} steps are readable; {run.stopped}")
+                    return FileState(path, PARTIAL, f"{run.steps_done} steps are readable; {run.stopped}")
     except RunFileError as error:
         return FileState(path, DAMAGED, str(error).removeprefix(f"{path}: "))
     return FileState(path, WHOLE)

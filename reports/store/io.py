@@ -143,62 +143,42 @@ def _checksum(path: Path, size: int) -> str:
     return digest.hexdigest()
 
 
-_noted: list[int] = []  # Ctrl-C that came while a file is written
-
-
 @contextmanager
 def _noting_ctrl_c() -> Iterator[None]:
-    """Note Ctrl-C and raise it at the end, or in `extend`: in a callback of h5py Python would drop the exception."""
+    """Note Ctrl-C and raise it at the end: in a callback of h5py Python would drop the exception."""
     if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
-    signal.signal(signal.SIGINT, lambda number, frame: _noted.append(number))
+    noted: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, frame: noted.append(number))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        _raise_noted()
-
-
-def _raise_noted() -> None:
-    if _noted:
-        _noted.clear()
-        raise KeyboardInterrupt
+        if noted:
+            raise KeyboardInterrupt
 
 
 @contextmanager
-def new_file(path: Path, *, replace: bool, large: bool = False) -> Iterator[Any]:
+def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
     """Yield an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` atomically.
 
-    It is filled in memory, so that a disk error occurs in our own write and not inside the HDF5 library. A `large` file
-    may exceed the memory and is filled on disk.
+    It is filled in memory, so that a disk error occurs in our own write and not inside the HDF5 library.
 
     Raises
     ------
     RunFileError
         The file cannot be written; then nothing at `path` was changed.
     """
-    with _noting_ctrl_c():
-        yield from _new_file(path, replace, large)
-
-
-def _new_file(path: Path, replace: bool, large: bool) -> Iterator[Any]:
     import h5py
 
-    if not large:
+    with _noting_ctrl_c():
         with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
             yield file
             file.flush()
             image = file.id.get_file_image()
-    with written_aside(path, replace=replace) as aside:
-        if not large:
+        with written_aside(path, replace=replace) as aside:
             aside.write_bytes(sealed(image))
-            return
-        with h5py.File(aside, "w", rdcc_nbytes=2 * _CHUNK_BYTES, locking=False) as file:
-            yield file
-        mark = _MARK + _checksum(aside, aside.stat().st_size).encode() + b"\n"
-        with aside.open("ab") as end:
-            end.write(mark)
 
 
 @contextmanager
@@ -242,11 +222,8 @@ def write_text(group: Any, name: str, text: str) -> None:
     group.create_dataset(name, data=text, dtype=h5py.string_dtype("utf-8"))
 
 
-def write_values(group: Any, name: str, values: Any, *, growing: bool = False) -> Any:
-    """Write an array or a sequence of texts; numbers get a chunked layout, shuffle and gzip.
-
-    A `growing` array can be extended along its first axis.
-    """
+def write_values(group: Any, name: str, values: Any) -> Any:
+    """Write an array or a sequence of texts; numbers get a chunked layout, shuffle and gzip."""
     import h5py
 
     array = np.asarray(values)
@@ -257,35 +234,22 @@ def write_values(group: Any, name: str, values: Any, *, growing: bool = False) -
         array = array.astype(np.uint8)  # netCDF has no truth values
     rows = max(_CHUNK_BYTES // max(int(np.prod(array.shape[1:])) * array.itemsize, 1), 1)
     largest: tuple[int | None, ...] = (None,) * array.ndim if array.size == 0 else array.shape
-    if growing:
-        largest = (None, *(length or None for length in array.shape[1:]))
-    chunks = (rows if growing else min(rows, max(array.shape[0], 1)), *(max(length, 1) for length in array.shape[1:]))
+    chunks = (min(rows, max(array.shape[0], 1)), *(max(length, 1) for length in array.shape[1:]))
     return group.create_dataset(name, data=array, chunks=chunks, maxshape=largest, compression="gzip",
                                 compression_opts=4, shuffle=True)  # fmt: skip
 
 
-def extend(dataset: Any, values: Any) -> None:
-    """Append rows to a growing dataset."""
-    _raise_noted()
-    if len(values):
-        first = len(dataset)
-        dataset.resize(first + len(values), axis=0)
-        dataset[first:] = np.asarray(values)
-
-
-def write_scale(group: Any, dimension: str, values: Any, unit: str, *, growing: bool = False) -> Any:
+def write_scale(group: Any, dimension: str, values: Any, unit: str) -> Any:
     """Write the values along a dimension, make them its scale, and return it."""
-    scale = write_values(group, dimension, values, growing=growing)
+    scale = write_values(group, dimension, values)
     scale.attrs["units"] = unit
     scale.make_scale(dimension)
     return scale
 
 
-def write_quantity(
-    group: Any, name: str, values: Any, scales: Sequence[Any], unit: str, meaning: str, *, growing: bool = False
-) -> Any:
+def write_quantity(group: Any, name: str, values: Any, scales: Sequence[Any], unit: str, meaning: str) -> Any:
     """Write one quantity along dimensions with these scales."""
-    dataset = write_values(group, name, values, growing=growing)
+    dataset = write_values(group, name, values)
     dataset.attrs.update({"units": unit, "long_name": meaning})
     for axis, scale in enumerate(scales):
         dataset.dims[axis].attach_scale(scale)

@@ -54,30 +54,14 @@ def write_run(
 
 
 def store_run(
-    path: Path | str, run: Run | Iterator[Run], *, key: str, code: str = "", stopped: str = "", replace: bool = False,
+    path: Path | str, run: Run, *, key: str, code: str = "", replace: bool = False,
     provenance: Mapping[str, str] | None = None,
 ) -> RunEntry:
-    """Write one run like `write_run`, with the label of its code; return the entry of the new file.
-
-    A run may be given in consecutive pieces, which are written in constant memory to the same content; then `stopped`
-    says why it is incomplete.
-    """
-    path, large = Path(path), not isinstance(run, Run)
-    with io.new_file(path, replace=replace, large=large) as file:
-        if isinstance(run, Run):
-            _write_run(file, run, key, code, provenance)
-            file.attrs["content_hash"] = content_hash(run)
-        else:
-            distrust: tuple[str, ...] = ()
-            for number, piece in enumerate(run):
-                distrust = distrust or piece.distrust
-                if number == 0:
-                    _write_run(file, piece, key, code, provenance, growing=True)
-                else:
-                    _append(file, piece)
-            file.attrs.update({"status": "partial" if stopped else "complete", "stopped": stopped,
-                               "distrust": json.dumps(distrust, ensure_ascii=False)})  # fmt: skip
-            file.attrs["content_hash"] = content_hash(_run_in(file, path, dataset_at))
+    """Write one run like `write_run`, with the label of its code; return the entry of the new file."""
+    path = Path(path)
+    with io.new_file(path, replace=replace) as file:
+        _write_run(file, run, key, code, provenance)
+        file.attrs["content_hash"] = content_hash(run)
         return _entry(file, path)
 
 
@@ -90,12 +74,11 @@ def _columns(run: Run) -> Iterator[tuple[str, Quantity, Any]]:
         yield "energy", Quantity(name, (energy_dimension(run, name),), np.float64, "J", meaning), values
 
 
-def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str, str] | None, *,
-               growing: bool = False) -> None:  # fmt: skip
+def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str, str] | None) -> None:
     file.attrs.update({
         "format": schema.FORMAT, "format_version": schema.FORMAT_VERSION, "title": f"{run.scene_name} · {run.world}",
         "status": "complete" if run.complete else "partial", "stopped": run.stopped, "run_key": key, "code": code,
-        "dt": float(run.dt), "energies": json.dumps([*run.energy]),
+        "dt": float(run.dt), "energies": json.dumps([*run.energy]), "every": run.every,
         "tool_dofs": run.tool_dofs, "tool_coordinates": run.tool_coordinates,
         **{name: json.dumps(getattr(run, name), ensure_ascii=False) for name in schema.SENTENCES},
     })  # fmt: skip
@@ -117,10 +100,10 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
         for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
             if (group, dimension) not in scales:
                 scales[group, dimension] = io.write_scale(
-                    groups[group], dimension, *coordinates_of(run, dimension, length), growing=growing)
+                    groups[group], dimension, *coordinates_of(run, dimension, length))
         along = [scales[group, name] for name in quantity.dimensions]
         dataset = io.write_quantity(groups[group], quantity.name, values, along, unit_of(quantity, run),
-                                    quantity.meaning, growing=growing)  # fmt: skip
+                                    quantity.meaning)  # fmt: skip
         if quantity.name == "state":
             dataset.attrs.update(schema.STATE_ATTRIBUTES)
     effects = file["effects"]
@@ -132,18 +115,6 @@ def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str
         io.write_quantity(effects, name, texts, [scale], "1", meaning)
     for name, text in (collect_provenance() if provenance is None else provenance).items():
         io.write_text(file["provenance"], name, text)
-
-
-def _append(file: Any, part: Run) -> None:
-    """Append a part; its first state equals the last one in the file."""
-    for group, quantity, values in _columns(part):
-        along, dataset = quantity.dimensions[0], file[group][quantity.name]
-        if along == "step_edge":
-            values = values + dataset[-1]
-        io.extend(dataset, values[int(along in ("time", "step_edge")):])
-        scale = file[group][along]
-        if len(scale) < len(dataset):
-            io.extend(scale, part.time[1:] if along == "time" else np.arange(len(scale), len(dataset)))
 
 
 def read_run(path: Path | str, budget: int | None = None) -> Run:
@@ -262,7 +233,8 @@ def _run_in(file: Any, path: Path | str, read: Reader, budget: int | None = None
     return Run(
         **parts, body_names=values_at(file, "mechanism/body", place),
         **tables["trajectory"], **tables["steps"], **tables["timings"],
-        dt=float(attribute_of(file, "dt")), complete=attribute_of(file, "status") == "complete",
+        dt=float(attribute_of(file, "dt")), every=index(attribute_of(file, "every")),
+        complete=attribute_of(file, "status") == "complete",
         stopped=str(attribute_of(file, "stopped", "")), time=_numbers(read, file, "trajectory", TIME, place),
         contacts=ContactTable(**tables["contacts"]), impacts=ImpactTable(**tables["impacts"]),
         energy={name: _numbers(read, file, "energy", TIME._replace(name=name), place) for name in energies},

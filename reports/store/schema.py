@@ -9,6 +9,10 @@
     /effects                  the active effects, and the reasons
     /timings, /provenance     outside of the content hash, because they depend on the machine
 
+If the attribute `every` of the file is N > 1, the record is thinned (`iapb.thinning`): its steps are every N-th step
+and each step with an impact. Kept step i begins at time[i]; impacts count the kept steps; energies are those at the
+kept instants, computed from all steps.
+
 Each group has its own dimension scales, so that it opens as one xarray dataset.
 """
 
@@ -24,7 +28,7 @@ from iapb.schema import Quantity, quantities
 
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"
-# 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M; 5: names of energies
+# 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M; 5: names of energies, every
 FORMAT_VERSION = 5
 
 # group -> its quantities, and the record that holds them

@@ -9,7 +9,7 @@ rows.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +37,14 @@ def write_table(path: Path | str, name: str, table: Table, *, title: str = "", c
         write_head(file, collect_provenance())
         group = file.create_group(name, track_order=True)
         group.attrs.update({"title": title, "command": command})
-        append_columns(group, ((column.key, column.unit or "1", column.title, _stored(table.column(column.key)))
-                               for column in table.columns))  # fmt: skip
+        scales: list[Any] = []  # of the first column, along the rows
+        for column in table.columns:
+            values, unit = _stored(table.column(column.key)), column.unit or "1"
+            if scales:
+                io.write_quantity(group, column.key, values, scales, unit, column.title)
+            else:
+                scales = [io.write_scale(group, column.key, values, unit)]
+                scales[0].attrs["long_name"] = column.title
         file.attrs["content_hash"] = hash_of([name, table.titles, table.rows])
     return path
 
@@ -54,18 +60,6 @@ def write_head(file: Any, provenance: Mapping[str, str]) -> None:
     file.attrs.update({"format": TABLE_FORMAT, "format_version": FORMAT_VERSION})
     for name, text in provenance.items():
         io.write_text(file.require_group("provenance"), name, text)
-
-
-def append_columns(group: Any, columns: Iterable[tuple[str, str, str, Any]]) -> None:
-    """Append rows, given as name, unit, meaning and values of each column; a new group gets the columns."""
-    for name, unit, meaning, values in columns:
-        if name in group:
-            io.extend(group[name], values)
-        elif not len(group):
-            io.write_scale(group, name, values, unit, growing=True)
-            group[name].attrs["long_name"] = meaning
-        else:
-            io.write_quantity(group, name, values, [group[next(iter(group))]], unit, meaning, growing=True)
 
 
 def read_columns(path: Path | str, name: str | None = None) -> dict[str, tuple[str, Any]]:

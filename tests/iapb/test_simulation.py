@@ -124,7 +124,8 @@ def test_a_wrong_hand_force_is_named(force):
 
 
 WRONG = {  # argument of `simulate` -> values that are refused
-    "steps": [0, -3, 2.5, True], "law": ["IAPB", Penalty], "max_memory": [float("nan"), "1GB", -1, True],
+    "steps": [0, -3, 2.5, True], "every": [0, 1.5], "law": ["IAPB", Penalty],
+    "max_memory": [float("nan"), "1GB", -1, True],
     "coupling": ["four-channel"], "coupling stiffness": [FourChannel((1.0,), (1.0,))], "progress": [1],
     "world": [["IAPB"], None],
 }
@@ -158,8 +159,11 @@ def test_a_record_that_would_not_fit_is_refused_with_its_size_before_it_is_alloc
         simulate("peg_corner", steps=10**400)
     each = recording.Recorder(Simulation("peg_corner")).bytes_per_step
     assert simulate("peg_corner", steps=10, max_memory=10 * each).steps == 10
-    with pytest.raises(ArgumentError, match="at most 9:"):
+    with pytest.raises(ArgumentError, match=r"at most 9:.*every=2 \(iapb run --every 2\)"):
         simulate("peg_corner", steps=10, max_memory=10 * each - 1)
+    assert simulate("peg_corner", steps=10, every=2, max_memory=10 * each - 1).steps_done == 10
+    with pytest.raises(ArgumentError, match=r"at most 18:"):
+        simulate("peg_corner", steps=20, every=2, max_memory=10 * each - 1)
 
 
 def test_a_run_shows_itself_in_a_line_a_table_a_picture_and_as_a_dataset():
@@ -233,12 +237,13 @@ def test_simulations_share_nothing_that_changes() -> None:
     alike, coupling = ARM.with_values({"contact.friction": 0.25}), coupling_of(ARM, "four-channel")
     moving, *others = (Simulation(system_of(each), coupling=coupling) for each in (ARM, ARM, alike))
     constant = {id(array) for each in (moving, *others) for array in each.port.mechanism.arrays()}
-    arrays = [array for each in (moving, *others) for array in each.arrays() if id(array) not in constant]
+    changing = {each: [*each.state.arrays(), *each.port.arrays()] for each in (moving, *others)}
+    arrays = [array for each in changing.values() for array in each if id(array) not in constant]
     assert not any(np.shares_memory(*two) for two in itertools.combinations(arrays, 2))
 
     def seen() -> list[bytes]:
         read = [each.world.arrays() + each.system.mechanism.block.arrays() for each in others]
-        return [array.tobytes() for array in itertools.chain(*read, *(each.arrays() for each in others))]
+        return [array.tobytes() for array in itertools.chain(*read, *(changing[each] for each in others))]
 
     before = seen()
     assert recording.Recorder(moving).chunk(moving.scene.steps) is None

@@ -1,31 +1,24 @@
 """Runs through the store: computed once, kept, never overwritten, never half a run taken for a whole one, made again.
 
-A run that is streamed, stopped, killed or cut off comes to the bits of one that is held in memory, and the command
-beside a run makes that run again, to the last bit.
+A run that is stopped or killed is computed again, and the command beside a run makes that run again, to the last bit.
 """
 
 import os
 import shlex
-import shutil
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError, RunFileError
-from iapb.recording import Recorder
 from iapb.scene import find_scene, load_scene, scene_names
-from iapb.simulation import INTERRUPTED, Simulation, simulate
-from reference.worlds import run_world
-from reports import cli, streaming
+from iapb.simulation import INTERRUPTED, simulate
+from reports import cli
 from reports.evidence import exact_energy
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.runner import Runner
 from reports.store import RunStore, content_hash, read_run
-from reports.store.parts import Parts, PartsLocked, parts_of, read_parts
-from reports.store.runs import opened_run, read_entry, store_run
 from reports.uses import parsed, run_command
-from tests.reports.made_up import flipped, made_run
+from tests.reports.made_up import made_run
 from verification.check import Study
 
 WHOLE = load_scene(find_scene("peg_corner"))
@@ -145,134 +138,24 @@ def test_every_scene_and_every_run_of_the_figures_has_a_command_and_a_scene_of_o
     assert cli.main(["store", "again", str(tmp_path / used.file)]) == 0
 
 
-# Streams
-
-# planar with impacts and a device; a tool that is carried; space, contacts and no device; a law in Python
-CASES = [("peg_corner", "IAPB", 1600), ("peg_corner", "CBuc", 1100), ("arm_obstacles", "PB", 1200),
-         ("peg_corner", "ideal", 1100)]  # fmt: skip
+# Killed and thinned runs
 
 
-def scene_of(name, steps):
-    scene = load_scene(find_scene(name))
-    return scene.with_values({"duration": steps / scene.rate})
-
-
-@pytest.fixture
-def a_part_for_every_chunk(monkeypatch):
-    for name, value in (("PAUSE", 0.0), ("_PARTS_SHARE", 1e9), ("HELD", 1)):
-        monkeypatch.setattr(streaming, name, value)
-
-
-def stop_after(chunks):
-    """Ctrl-C after some chunks."""
-    def progress(done, total):
-        if done >= 512 * chunks:
-            raise KeyboardInterrupt
-
-    return progress
-
-
-@pytest.mark.parametrize(("name", "world", "steps"), CASES)
-def test_a_streamed_run_stopped_or_not_has_the_content_of_one_held_in_memory(
-    name, world, steps, tmp_path, a_part_for_every_chunk
-):
-    scene = scene_of(name, steps)
-    held = content_hash(run_world(scene, world))
-    place, streamed = Runner(tmp_path / "whole").stream(scene, world)
-    assert not streamed.stopped and held == read_entry(place.path).content_hash == content_hash(read_run(place.path))
-    with opened_run(place.path) as (run, _):
-        assert run.steps == steps and run.chunk_steps[:].sum() == steps
-    runner = Runner(tmp_path, stop_after(2))
-    place, stopped = runner.stream(scene, world)
-    assert stopped.stopped == INTERRUPTED and stopped.resumable and not place.path.exists()
-    assert read_run(place.partial).steps == 2 * 512
-    runner.progress = None
-    place, streamed = runner.stream(scene, world, resume=True)
-    assert streamed.resumed_at == 512 and read_entry(place.path).content_hash == held
-    assert {path.suffix for path in tmp_path.rglob("*.*")} == {".h5", ".json"}  # no part is left
-
-
-def test_what_an_earlier_piece_distrusts_is_kept(tmp_path):
-    recorder = Recorder(Simulation(PEG))
-    first, last = (recorder.chunk(PEG.steps) or recorder.take("IAPB") for _ in range(2))
-    store_run(tmp_path / "a.h5", iter([replace(first, distrust=("it sank",)), last]), key="", provenance={})
-    assert read_run(tmp_path / "a.h5").distrust == ("it sank",)
-
-
-@pytest.fixture
-def killed(tmp_path, a_part_for_every_chunk):
-    """The parts that a process leaves which is killed in its fifth chunk, and its scene."""
-    scene = scene_of("peg_corner", 2600)
+def test_a_killed_run_leaves_nothing_and_is_computed_again(tmp_path):
     process = os.fork()
     if process == 0:
-        Runner(tmp_path, lambda done, total: os._exit(9) if done > 2048 else None).stream(scene, "IAPB")
-    os.waitpid(process, 0)
-    [parts] = tmp_path.glob("*.parts")
-    return parts, scene
+        Runner(tmp_path, lambda done, total: os._exit(9) if done > 512 else None)(PEG, "IAPB")
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 9 and not list(tmp_path.iterdir())
+    place = Runner(tmp_path).place_of(PEG, "IAPB")
+    place.path.with_name(f".{place.path.name}.1.writing").write_bytes(b"of a process killed while it wrote")
+    run = Runner(tmp_path)(PEG, "IAPB")
+    assert content_hash(read_run(place.path)) == content_hash(run)
 
 
-def exchange(one, other):
-    shutil.copy(one, one.with_name("x"))
-    shutil.copy(other, one)
-    os.replace(one.with_name("x"), other)
-
-
-HARMS = {
-    "cut": lambda one, other: os.truncate(one, one.stat().st_size // 2),
-    "cut to nothing": lambda one, other: os.truncate(one, 0),
-    "damaged in its line": lambda one, other: one.write_bytes(flipped(one.read_bytes(), 0.01)),
-    "damaged in its numbers": lambda one, other: one.write_bytes(flipped(one.read_bytes(), 0.7)),
-    "lost": lambda one, other: one.unlink(), "doubled": lambda one, other: shutil.copy(other, one),
-    "exchanged": exchange,
-}  # fmt: skip
-
-
-def test_what_is_cut_off_damaged_lost_doubled_or_exchanged_is_computed_again(killed):
-    parts, scene = killed
-    whole, right = parts.with_name("whole"), content_hash(run_world(scene, "IAPB"))
-    shutil.copytree(parts, whole)
-    names = sorted(path.name for path in parts.glob("*.part"))
-    assert len(names) == 5  # the head, and four chunks
-    for number, (harm, harmed) in enumerate((harm, at) for harm in HARMS for at in (2, 4)):
-        shutil.rmtree(parts, ignore_errors=True)
-        shutil.copytree(whole, parts)
-        HARMS[harm](parts / names[harmed], parts / names[3])
-        kept = 2 if harm == "exchanged" and harmed == 4 else harmed - 1
-        assert len(list(read_parts(parts))) == kept, (harm, harmed)
-        if number % 4 in (1, 2) and harm != "exchanged":  # each harm is resumed at one place, the last one at both
-            continue
-        place, streamed = Runner(parts.parent).stream(scene, "IAPB", resume=True)
-        assert streamed.resumed_at == 512 * kept and read_entry(place.path).content_hash == right
-        place.path.unlink()
-    shutil.copytree(whole, parts)
-    (parts / names[0]).write_bytes(flipped((parts / names[0]).read_bytes()))
-    with pytest.raises(RunFileError, match="first part"):
-        Runner(parts.parent).stream(scene, "IAPB", resume=True)
-    _, streamed = Runner(parts.parent).stream(scene, "IAPB")
-    assert not streamed.resumed_at and not parts.exists()
-
-
-def test_parts_of_another_run_or_of_nobody_are_refused_and_left(killed, tmp_path):
-    parts, _ = killed
-    other = scene_of("peg_corner", 4100)
-    place, _ = Runner(tmp_path, stop_after(1)).stream(other, "IAPB")
-    shutil.rmtree(parts_of(place.path), ignore_errors=True)
-    shutil.copytree(parts, parts_of(place.path))
-    with pytest.raises(RunFileError, match="another run"):
-        Runner(tmp_path).stream(other, "IAPB", resume=True)
-    shutil.rmtree(parts_of(place.path))
-    theirs = parts_of(place.path) / "00000001.part"
-    theirs.parent.mkdir()
-    theirs.write_text("somebody else's")
-    for resume, said in ((True, None), (False, "only 0 of")):
-        with pytest.raises(RunFileError, match=said):
-            Runner(tmp_path).stream(other, "IAPB", resume=resume)
-    assert theirs.read_text() == "somebody else's" and not place.path.exists()
-    held = Parts(tmp_path / "own" / "x.h5.parts", {})
-    with pytest.raises(PartsLocked):  # two processes do not write one run
-        Parts(tmp_path / "own" / "x.h5.parts", {})
-    held.close()
-    Parts(tmp_path / "own" / "x.h5.parts", {}).close(remove=True)
-    assert not list((tmp_path / "own").iterdir())
-
-
+def test_a_thinned_run_has_its_own_file_and_comes_out_the_same_again(tmp_path):
+    run, entry = Runner(tmp_path).fetch(PEG, "IAPB", every=10)
+    whole = Runner(tmp_path)(PEG, "IAPB")
+    assert run.every == 10 and run.steps < whole.steps == run.steps_done and len(list(tmp_path.glob("*.h5"))) == 2
+    assert read_run(tmp_path / entry.file).every == 10
+    assert cli.main(["store", "again", str(tmp_path)]) == 0 == cli.main(["certify", str(tmp_path)])
+    assert cli.main(["inspect", str(tmp_path / entry.file)]) == 0
