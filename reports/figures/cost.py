@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -177,10 +176,8 @@ def _draw_front(plot: Plot, points: Iterable[tuple[float, float]]) -> None:
     plot.curve(steps, _FRONT, marked=False, alpha=0.25)
 
 
-_ENGINES = {method: replace(STYLES[method], filled=False) for method in motion.WORLDS if method in STYLES}
-_WORLDS = {motion.IMPULSES: STYLES["IAPB, Euler"], motion.STIFFENED: STYLES["PB, stiffened"],
-           IDEAL: STYLES["ideal, Python"], **_ENGINES}  # fmt: skip
-_INTEGRATORS = {method: STYLES[name] for method, name in motion.SHORT.items()}
+_WORLDS = {"IAPB": STYLES["IAPB"], "PB": STYLES["PB"], IDEAL: STYLES["ideal, Python"],
+           "MuJoCo": replace(STYLES["MuJoCo"], filled=False)}  # fmt: skip
 _FRONT = LineStyle(MUTED, "", (), 3.0)  # in the legend alone; `_draw_front` draws it
 _HEADINGS = ("called", "time for a tenth of the error: median, range (scenes with a fit)", "smallest error, median",
              "best for its time (grey): scenes, errors", "largest energy gain, relative to the kinetic energy")
@@ -189,10 +186,11 @@ _FAST = 100.0  # [ms per simulated second] ten times as fast as the motion
 _PALE = 0.45  # strength of marks that are not used
 
 
-def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle], most: int | None = None) -> Drawn:
-    """Draw what a motion costs by world or by integrator: a table, and a panel for each of the first `most` scenes."""
-    looks = {name: look for name, look in drawn.items() if name in motions.column("method")}
-    found, worth = motion.curves(motions, tuple(looks)), motion.worth(motions, tuple(looks))
+@recipe("trajectory-precision", "haptic-rate/motions")
+def trajectory_precision(motions: Table) -> Drawn:
+    """Draw what a motion costs by world: a table, and a panel for each scene."""
+    looks = {name: look for name, look in _WORLDS.items() if name in motions.column("method")}
+    found, worth = motion.curves(motions), motion.worth(motions)
     told, table = [], dict[str, Sequence[Markup]]()
     for row in worth.records():
         step = max((run["energy made"], run["step"]) for curve in found for run in curve.runs
@@ -202,19 +200,14 @@ def _precision(key: str, motions: Table, drawn: Mapping[str, LineStyle], most: i
         table[Markup("{} {}").format(swatch(look), look.name)] = [
             cell(Markup("<b>{}</b>").format(said) if said == _NEVER else said) for said in words]
     panels = [Panel(grid(_HEADINGS, table, "plain"), "; ".join(told), wide=True)]
-    for number, scene in enumerate([*dict.fromkeys(motions.column("scene"))][:most]):
+    for number, scene in enumerate(dict.fromkeys(motions.column("scene"))):
         here = [curve for curve in found if curve.scene == scene]
         said = ", ".join(f"{looks[curve.method].name}: {curve.words}" for curve in here)
         lost = motions.only(outcome != "ok" for outcome in motions.column("outcome")).where(scene=scene)
-        panels.append(Panel(_motions(f"{key}-{number}", here, lost, looks),
+        panels.append(Panel(_motions(f"trajectory-precision-{number}", here, lost, looks),
                             f"{scene}: error of position against computing time. {said}.",
                             f"{scene}. Smallest error{_nearest(here, looks)}"))
     return Drawn(panels, worth, {look.name: look for look in looks.values()} | {"best for its time": _FRONT})
-
-
-RECIPES = tuple(recipe(key, "haptic-rate/motions")(partial(_precision, key, drawn=drawn, most=most))
-                for key, drawn, most in (("trajectory-precision", _WORLDS, None),
-                                         ("integrator-precision", _INTEGRATORS, 1)))
 
 
 def _nearest(here: Sequence[motion.Curve], looks: Mapping[str, LineStyle]) -> str:

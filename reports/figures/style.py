@@ -45,8 +45,8 @@ class LineStyle:
 LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # the worlds of the paper and of this project
     (("ideal",), LineStyle(INK, "", (), 2.4)),
-    (("IAPB", "pfull", "factored", "IAPB, Euler", "impulses"), LineStyle(BLUE, "o", (), 1.6)),
-    (("PB", "PB, Euler", "penalty"), LineStyle(VERMILION, "s", (5, 1.6), 1.5)),
+    (("IAPB", "pfull", "factored", "impulses"), LineStyle(BLUE, "o", (), 1.6)),
+    (("PB", "penalty"), LineStyle(VERMILION, "s", (5, 1.6), 1.5)),
     (("CBuc",), LineStyle(GREEN, "^", (1.4, 1.4), 1.6)),
     (("ideal-friction",), LineStyle(INK, "D", (4, 1.6), 1.6)),
     (("IAPB-friction",), LineStyle(SKY, "v", (6, 1.6, 1.4, 1.6), 1.5)),
@@ -65,12 +65,8 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     (("DAQP, Python",), LineStyle(AMBER, "D", (4, 2), 1.2, filled=False)),
     # other engines
     (("MuJoCo",), LineStyle(PURPLE, "^", (6, 1.6, 1.4, 1.6))),
-    # worlds called from Python, and worlds by another integrator
+    # worlds called from Python
     (("ideal, Python",), LineStyle(INK, "o", (), 1.6, filled=False)),
-    (("IAPB, midpoint",), LineStyle(BLUE, "s", (1.4, 1.4), 1.2)),
-    (("IAPB, RK4",), LineStyle(BLUE, ">", (4, 2), 1.2)),
-    (("PB, RK4",), LineStyle(VERMILION, ">", (4, 1, 1, 1), 1.2)),
-    (("PB, stiffened",), LineStyle(VERMILION, "d", (), 1.4)),
     # rows of an impact
     (("relative rows (12)",), LineStyle(BLUE, "D")),
     (("per-body rows (13)-(14)",), LineStyle(VERMILION, "X", (5, 1.6))),

@@ -37,7 +37,7 @@ from verification.complementarity.agreement import TWO_CONTACTS
 from verification.cost.accuracy import WAYS
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
-from verification.cost.trajectories import BELOW, INTEGRATORS, OK, TIMED_OUT, WORLDS
+from verification.cost.trajectories import BELOW, OK, TIMED_OUT, WORLDS
 from verification.mechanics import linked_impacts
 from verification.mechanics.mechanics import mechanics
 from verification.stability.topic import contact_stability
@@ -47,7 +47,7 @@ MOST_SERIES = 6
 OF_WORLDS = {(look.color, look.marker): names for names, look in LOOKS[:7] if look.marker}
 SCENES = tuple(f"scene {k}" for k in range(6))
 CHECKS = {"mechanics": mechanics.checks, "stability": contact_stability.checks, "complementarity": [TWO_CONTACTS]}
-METHODS = tuple(dict.fromkeys((*WORLDS, *INTEGRATORS)))
+METHODS = (*WORLDS, "MuJoCo")
 
 
 def tables():

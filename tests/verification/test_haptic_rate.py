@@ -16,7 +16,7 @@ from verification.cost.growth import FACTORED, FITTED, MILLISECOND, SCALING, fit
 from verification.cost.robots import MANY, ONE, ROBOTS
 from verification.cost.solvers import DAQP, IAPB, IMPACT_TIMES, KERNEL, printed_faster
 from verification.cost.steps import BODIES, IDEAL, RACES
-from verification.cost.trajectories import BELOW, MOTIONS, STIFFENED, TIMED_OUT, WORLDS, WORTH, curves, worth
+from verification.cost.trajectories import BELOW, MOTIONS, TIMED_OUT, WORTH, curves, worth
 from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Finding
 from verification.haptic_rate import BENCH, KERNELS, RATE, SOLVERS, TOPIC, quoting
 from verification.table import Table, table_from
@@ -74,7 +74,7 @@ LATE = C19.table_of([{"method": name, "deadline": MILLISECOND, "coordinates": 3,
 def tables() -> Tables:
     """Every target is met."""
     motions = MOTIONS.table_of([
-        _run("IAPB, semi-implicit Euler", 1.0, 1e-3, 1.0), _run(STIFFENED, 1.0, 1.0, 1.0),
+        _run("IAPB", 1.0, 1e-3, 1.0), _run("PB", 1.0, 1.0, 1.0),
         _run("MuJoCo", 1.0, 1e-2, 10.0), _run("MuJoCo", 0.1, None, 3e3, "timed out")])  # fmt: skip
     scaled = _times(20.0)
     given = {
@@ -86,7 +86,7 @@ def tables() -> Tables:
                                  for form in (ONE, MANY)]),
         SOLVERS: _costs((IAPB, 1e-4), (KERNEL, 1e-6), ("daqp", 3e-4), (DAQP, 2e-4)),
         BUDGET_ROWS: BUDGET_ROWS.table_of([_budget(budget) for budget in range(5)]),
-        MOTIONS: motions, WORTH: worth(motions, WORLDS),
+        MOTIONS: motions, WORTH: worth(motions),
     }  # fmt: skip
     return {check.key: table for check, table in given.items()} | {KERNELS.key: _kernels(2.0, 3.0)}
 
@@ -150,12 +150,12 @@ def _table(**errors: tuple[float, ...]) -> Table:
 
 def test_what_a_tenfold_accuracy_costs_and_who_is_never_worth_it() -> None:
     """Error over time with slope −1/2 costs a hundredfold; a method behind another on every scene is on no front."""
-    good, late = worth(_table(good=(1e-1, 1e-2, 1e-3), late=(2e-1, 2e-1, 2e-1)), ("good", "late")).records()
+    good, late = worth(_table(good=(1e-1, 1e-2, 1e-3), late=(2e-1, 2e-1, 2e-1))).records()
     assert good["tenfold accuracy costs"] == pytest.approx(100.0) and good["best for its time"] == 1
     assert late["tenfold accuracy costs"] is None and late["least error"] == 2e-1
     assert late["best for its time"] == 0 and late["error stays"] == 1
     # a fast run is not worth its time if its error is useless
-    coarse, fine = worth(_table(coarse=(0.9,), fine=(1.0, 0.95, 0.01)), ("coarse", "fine")).records()
+    coarse, fine = worth(_table(coarse=(0.9,), fine=(1.0, 0.95, 0.01))).records()
     assert coarse["best for its time"] == 0 and fine["best for its time"] == 1
 
 
@@ -167,14 +167,14 @@ def test_a_method_that_our_limit_of_time_cuts_short_is_not_called_worthless(
     runs = [*_table(good=(1e-1, 1e-2, 1e-3), slow=errors).by_title(), _run("slow", 1e-3, None, 1e9, TIMED_OUT)]
     motions = MOTIONS.table_of([run | {"time [ms/s]": 2.0 * run["time [ms/s]"]} if run["method"] == "slow" else run
                                 for run in runs])  # fmt: skip
-    good, slow = worth(motions, ("good", "slow")).records()
+    good, slow = worth(motions).records()
     assert (good["cut short"], slow["cut short"], slow["best for its time"]) == (0, undecided, 0)
 
 
 def test_a_motion_on_which_another_world_is_more_exact_is_a_miss() -> None:
-    errors = {"IAPB, semi-implicit Euler": (1e-1, 1e-2), "PB, semi-implicit Euler": (1.0,), IDEAL: (1e-1, 5e-3)}
+    errors = {"IAPB": (1e-1, 1e-2), "PB": (1.0,), IDEAL: (1e-1, 5e-3)}
     [part] = MOTIONS.sentences(_table(**errors))
-    assert part.verdict == MIXED and "as exact as ideal (smallest errors 1 % and 0.5 % of" in part.miss
+    assert part.verdict == MIXED and f"as exact as {IDEAL} (smallest errors 1 % and 0.5 % of" in part.miss
     [part] = MOTIONS.sentences(_table(**errors | {IDEAL: (1e-1, 2e-2)}))
     assert part.verdict == REPRODUCED
 
@@ -192,7 +192,7 @@ def test_a_motion_on_which_another_world_is_more_exact_is_a_miss() -> None:
 def test_a_fit_takes_the_runs_on_which_the_error_falls(
     errors: tuple[float, ...], used: tuple[float, ...], words: str
 ) -> None:
-    [curve] = curves(_table(good=errors), ("good",))
+    [curve] = curves(_table(good=errors))
     assert tuple(run["position"] for run in curve.used) == used and curve.words == words
     assert (curve.cost is None) == (not used or "runs" in words)
     assert sorted(run["position"] for run in curve.runs) == sorted(errors)

@@ -1,107 +1,67 @@
-"""Error and computing time of whole motions, over methods and steps; the truth is the event-driven solution.
+"""Error and computing time of whole motions, over worlds and steps; the truth is the event-driven solution.
 
-Our compiled worlds are timed in their loop, with the record. The other methods are called from Python with set-up and
-record; their time is the least time of a run minus the least time of a run of one step. Short runs are repeated
-REPEATS times.
+Each world is timed in its loop, with the record and without the set-up. Short runs are repeated REPEATS times, and the
+least time counts.
 
 A run that raises an exception or gives values that are not finite is a failure. A run that, judged by the coarser
 steps, would take longer than LONGEST is a time-out and is not made. Both have rows in the table. If an error is below
 the error bound of the truth, the row has this bound instead, and its note says so. No scene has an impact at a multiple
 of a step, because there a run would be exact by chance.
 
-`curves` computes the cost of ten times the accuracy for each method and scene, and the figures show the same curves.
+`curves` computes the cost of ten times the accuracy for each world and scene, and the figure shows the same curves.
 A cost is never extrapolated: it is fitted only to runs that themselves span ten times the accuracy. `worth` summarizes
-the curves of each method.
+the curves of each world.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from math import cos, inf, pi, sin, sqrt
+from math import inf
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from iapb.contact import laws
-from iapb.errors import IapbError, MissingDependencyError
+from iapb.run import Run
+from iapb.scene import Scene, load_scene
+from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import Simulation
 from reference import Floats
 from reference.one_thread import one_thread
 from reference.scene_events import scene_truth
-from reference.simulators import FixedScene, Settings, Trajectory, find_simulator, fixed_scene
-from reference.simulators.own_engines import own_scene, world_state
-from reference.simulators.scene import FLOOR, RADIUS, WEIGHT, Cuboid, Obstacle, RigidBody, Sphere, rotation
-from reference.simulators.simulator import LOWEST, damping_for
-from reference.simulators.trajectory import steps_between_samples
+from reference.worlds import find_world
 from verification.check import Check, Study
 from verification.clock import target, timed
 from verification.cost.steps import IDEAL, RecordedLoop
 from verification.finding import Part, attempt
 from verification.table import Row, Table
 
-_BOUNCE, _FALL, _SPEED = 0.7, 0.1037, 1.0  # e, height [m] above the floor and speed [m/s] downwards at the start
-_PEG = (0.021, 0.0105, 0.0105)  # [m] the sides of the paper's peg, and a third side
-_TILT, _PUSH = 0.05, (-0.8, 0.0, -1.0)  # [rad] about y, [m/s2] towards wall and floor
-_LATER = 0.5e-3 * (sqrt(5.0) - 1.0)  # [s] the golden ratio of a millisecond: no step divides it
-
-
-def bouncing_ball() -> FixedScene:
-    """A falling ball; the motion ends in flight after the fifth bounce, with the velocity of the parabolas."""
-    ball = RigidBody("ball", 1.0, (0.4 * RADIUS**2,) * 3, (Sphere(RADIUS),), (0.0, 0.0, RADIUS + _FALL),
-                     velocity=(0.0, 0.0, -_SPEED))  # fmt: skip
-    return FixedScene("bouncing_ball", "bouncing ball, e = 0.7", "parabolas", (ball,), (FLOOR,), _BOUNCE, 0.75,
-                      2.0 * RADIUS, WEIGHT, ((0.0, 0.0, -0.1452010665010186),))  # fmt: skip
-
-
-def peg_landing() -> FixedScene:
-    """A tilted peg is pushed into a corner without bounce; its edges touch the floor and the wall one after another."""
-    wall = Obstacle("wall", (0.5, 2.0, 2.0), (-0.25, 0.0, 0.75))
-    half = 0.5 * _PEG[0]
-    peg = RigidBody("peg", 2.0, (0.005,) * 3, (Cuboid(_PEG),), (half + 0.0131, 0.0, 0.5 * _PEG[2] + 0.0087),
-                    (0.0, sin(0.5 * _TILT), 0.0, cos(0.5 * _TILT)))  # fmt: skip
-    return FixedScene("peg_landing", "peg into a corner, e = 0", "every impact plastic", (peg,), (FLOOR, wall), 0.0,
-                      0.185, _PEG[0], _PUSH)  # fmt: skip
-
-
-def later(scene: FixedScene) -> FixedScene:
-    """Return the scene with its first impact `_LATER` later, because its bodies start earlier in their flight.
-
-    In the scene itself an impact is at a multiple of the step, and a run with that step is exact by chance.
-    """
-    gravity = np.array(scene.gravity)
-
-    def earlier(body: RigidBody) -> RigidBody:
-        position, velocity = np.array(body.position), np.array(body.velocity)
-        x, y, z = (position - _LATER * velocity + 0.5 * _LATER**2 * gravity).tolist()
-        vx, vy, vz = (velocity - _LATER * gravity).tolist()
-        return replace(body, position=(x, y, z), velocity=(vx, vy, vz))
-
-    return replace(scene, bodies=tuple(map(earlier, scene.bodies)))
-
-
-TRAJECTORY_SCENES: dict[str, Callable[[], FixedScene]] = {
-    "cradle": lambda: later(replace(fixed_scene("elastic_cradle"), title="cradle, e = 1")),  # till all four are over
-    "bouncing_ball": bouncing_ball, "peg_landing": peg_landing,
-    "bernoulli": lambda: later(fixed_scene("bernoulli")),
-    "box_on_four_corners": lambda: later(fixed_scene("box_on_four_corners")),
-    "box_on_sixteen_corners": lambda: later(fixed_scene("box_on_sixteen_corners")),
-}  # fmt: skip
+FOLDER = Path(__file__).with_name("scenes") / "motions"
+# scene -> size of its bodies [m], the scale of errors
+TRAJECTORY_SCENES = {
+    "cradle": 0.1,
+    "bouncing_ball": 0.1,
+    "peg_landing": 0.021,
+    "bernoulli": 0.1,
+    "box_on_four_corners": 0.1,
+    "box_on_sixteen_corners": 0.1,
+}
 
 STEPS = {
     "quick": (8e-3, 2e-3, 5e-4, 1e-4, 2e-5),
     "full": (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
 }  # [s]
-ENGINES = ("mujoco", "bullet", "drake")  # adapters of engines that accept any step
+SAMPLES = 1000.0  # [1/s] of a motion that are compared with the truth
 REPEATS = 5  # number of repetitions of runs below ONCE seconds
-_SET_UPS = 3  # number of timed set-ups of each repetition
 ONCE = 0.05
 LONGEST = {"quick": 2.0, "full": 20.0}  # [s] largest time of one run
 OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
 
-# scene, step, duration -> motion, seconds of the run with its set-up, seconds of the set-up
-Motion = Callable[[FixedScene, float, float], tuple[Trajectory, float, float]]
+# A world: it simulates a scene and returns the run with its computing time [s], without the set-up.
+World = Callable[[Scene], tuple[Run, float]]
 
 
 BELOW = "below the truth's error bound"
@@ -109,21 +69,26 @@ Record = dict[str, Any]
 ERRORS = ("position", "energy", "signed energy", "energy made")
 
 
+def scene_of(name: str) -> Scene:
+    """Return a scene of the study."""
+    return load_scene(FOLDER / f"{name}.yaml")
+
+
 def motions_of(study: Study, name: str) -> Iterator[Row]:
-    """Yield the runs of every installed method on a scene with every step, coarse to fine.
+    """Yield the runs of every world on a scene with every step, coarse to fine.
 
     position : largest distance of a body's centre, or of a point half a length beside it, from the truth
     signed energy : error of the energy at the end; positive is a gain
     energy made : largest rise of kinetic plus potential energy above its start value, without elastic energy
     time : computing time per simulated second; of a failed run until it failed, of a time-out the expected time
     """
-    scene = TRAJECTORY_SCENES[name]()
+    scene = scene_of(name)
     with one_thread():
-        judge = Judge(scene)
-        for method, way in methods().items():
-            over = partial(over_steps, scene, way, judge, STEPS[study.depth], LONGEST[study.depth])
-            for run in attempt(f"{method} on {scene.title}", over, study.failures) or ():
-                yield {"scene": scene.title, "method": method, **run}
+        judge = Judge(scene, TRAJECTORY_SCENES[name])
+        for world, simulated in WORLDS.items():
+            over = partial(over_steps, scene, simulated, judge, STEPS[study.depth], LONGEST[study.depth])
+            for run in attempt(f"{world} on {scene.title}", over, study.failures) or ():
+                yield {"scene": scene.title, "method": world, **run}
 
 
 GAINED = 1.5  # a run belongs to a fit if its error is at least this many times smaller than that of the run before it
@@ -134,7 +99,7 @@ _LEAST_FALL = 3.0  # with a smaller fall of the error it is said to stay
 
 @dataclass(frozen=True)
 class Curve:
-    """One method on one scene; runs are in the order of their steps, from the coarsest to the finest.
+    """One world on one scene; runs are in the order of their steps, from the coarsest to the finest.
 
     Attributes
     ----------
@@ -185,14 +150,14 @@ def by_chance(run: Row) -> bool:
     return "position" in run["note"] and str(run["note"]).endswith(BELOW)
 
 
-def curves(motions: Table, methods: Sequence[str]) -> list[Curve]:
-    """Return a curve for each scene and each of these methods that has a run; fronts compare only these methods."""
+def curves(motions: Table) -> list[Curve]:
+    """Return a curve for each scene and each world that has a run."""
     found: list[Curve] = []
     for scene in dict.fromkeys(motions.column("scene")):
         here = sorted((run for run in motions.where(scene=scene, outcome=OK).records()
-                       if run["method"] in methods and run["time"] > 0.0), key=lambda run: -float(run["step"]))
+                       if run["time"] > 0.0), key=lambda run: -float(run["step"]))
         honest = [run for run in here if not by_chance(run)]
-        for method in methods:
+        for method in dict.fromkeys(motions.column("method")):
             runs = [run for run in honest if run["method"] == method]
             if not runs:
                 continue
@@ -233,22 +198,23 @@ def tenfold_cost(runs: Sequence[Record]) -> float | None:
     return float(10.0 ** (-1.0 / np.polyfit(time, error, 1)[0]))
 
 
-def worth(motions: Table, methods: Sequence[str]) -> Table:
-    """Return for each method its errors over all scenes, its cost of ten times the accuracy, and its best scenes.
+def worth(motions: Table) -> Table:
+    """Return for each world its errors over all scenes, its cost of ten times the accuracy, and its best scenes.
 
     The cost is the median over the scenes on which it can be fitted (see `Curve.cost`). "Error stays" is the number of
-    scenes on which the error does not fall. "Best for its time" is the number of scenes in which the method is on the
-    front with an error of at most USEFUL. "Cut short" is the number of scenes in which the method might still reach
+    scenes on which the error does not fall. "Best for its time" is the number of scenes in which the world is on the
+    front with an error of at most USEFUL. "Cut short" is the number of scenes in which the world might still reach
     the front with steps that would take too long.
     """
     rows, by_method = list[Row](), dict[str, list[Curve]]()
-    for curve in sorted(curves(motions, methods), key=lambda curve: methods.index(curve.method)):
+    worlds = [*dict.fromkeys(motions.column("method"))]
+    for curve in sorted(curves(motions), key=lambda curve: worlds.index(curve.method)):
         by_method.setdefault(curve.method, []).append(curve)
     for method, mine in by_method.items():
         costs = [curve.cost for curve in mine if curve.cost is not None]
         front = [run["position"] for curve in mine for run in curve.front]
         rows.append({
-            "method": method, "called": "compiled" if method in INTEGRATORS else "from Python",
+            "method": method, "called": "compiled" if method in COMPILED else "from Python",
             "tenfold accuracy costs": float(np.median(costs)) if costs else None,
             "least cost": min(costs, default=None), "largest cost": max(costs, default=None),
             "scenes fitted": len(costs), "error stays": sum(not curve.used and not curve.too_few for curve in mine),
@@ -261,37 +227,24 @@ def worth(motions: Table, methods: Sequence[str]) -> Table:
     return WORTH.table_of(rows)
 
 
-IMPULSES, PENALTIES = "IAPB, semi-implicit Euler", "PB, semi-implicit Euler"
-STIFFENED = "PB with stiffened walls, Runge-Kutta 4"  # see `_stiffened`
-# Two comparisons of at most six curves each: worlds and engines, and integrators. Each has its own front.
-WORLDS = (IMPULSES, STIFFENED, IDEAL, "MuJoCo", "Drake", "Bullet")
-INTEGRATORS = (IMPULSES, "IAPB, midpoint", "IAPB, Runge-Kutta 4", PENALTIES, "PB, Runge-Kutta 4", STIFFENED)
-SHORT = dict(zip(INTEGRATORS, ("IAPB, Euler", "IAPB, midpoint", "IAPB, RK4", "PB, Euler", "PB, RK4", "PB, stiffened"),
-                 strict=True))  # names in print
+def _our_world(name: str) -> World:
+    """Return one of our worlds, timed in its loop."""
+
+    def run(scene: Scene) -> tuple[Run, float]:
+        loop = RecordedLoop(Simulation(scene, find_world(name).law), scene.steps)
+        seconds = loop.sample() * loop.steps
+        return loop.recording.run("", name), seconds
+
+    return run
 
 
-def methods() -> dict[str, Motion]:
-    """Return the motion functions by name: our worlds with several integrators, the ideal world, installed engines."""
-    ways: dict[str, Motion] = {
-        IMPULSES: _compiled("ImpulseAugmented", "semi_implicit_euler"),
-        "IAPB, midpoint": _compiled("ImpulseAugmented", "midpoint"),
-        "IAPB, Runge-Kutta 4": _compiled("ImpulseAugmented", "runge_kutta_4"),
-        PENALTIES: _compiled("Penalty", "semi_implicit_euler"),
-        "PB, Runge-Kutta 4": _compiled("Penalty", "runge_kutta_4"),
-        STIFFENED: _compiled("Penalty", "runge_kutta_4", _stiffened),
-        IDEAL: _adapter("rigid"),
-    }
-    for name in ENGINES:
-        try:
-            find_simulator(name).version()
-        except MissingDependencyError:
-            continue
-        ways[find_simulator(name).title] = _adapter(name)
-    return ways
+COMPILED = ("IAPB", "PB")
+# To add a world, add a line here.
+WORLDS: dict[str, World] = {**{name: _our_world(name) for name in COMPILED}, IDEAL: _our_world("ideal")}
 
 
-def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[float], longest: float) -> list[Record]:
-    """Run one method with every step; failures and runs that would take longer than `longest` [s] also give rows."""
+def over_steps(scene: Scene, world: World, judge: Judge, steps: Sequence[float], longest: float) -> list[Record]:
+    """Run one world with every step; failures and runs that would take longer than `longest` [s] also give rows."""
     runs: list[Record] = []
     per_step = 0.0
     for step in sorted(steps, reverse=True):
@@ -299,122 +252,74 @@ def over_steps(scene: FixedScene, way: Motion, judge: Judge, steps: Sequence[flo
         run: Record = {"step [ms]": 1e3 * step, "time [ms/s]": None, **dict.fromkeys(ERRORS), "outcome": TIMED_OUT,
                        "note": f"would take {seconds:.3g} s; limit: {longest:g} s"}  # fmt: skip
         if seconds <= longest:
-            found, seconds = timed(partial(_tried, way, scene, step))
+            found, seconds = timed(partial(_tried, world, scene.with_values({"rate": 1.0 / step})))
             if isinstance(found, Exception):
                 run |= {"outcome": FAILED, "note": " ".join(f"{type(found).__name__}: {found}".split())[:160]}
             else:
                 motion, seconds = found
                 per_step = seconds / (scene.duration / step)
-                errors, note = judge.errors(motion) if motion.finite else ({}, "not a number")
-                run |= {**errors, "outcome": OK if motion.finite else FAILED, "note": note}
+                finite = bool(np.isfinite(motion.q).all() and np.isfinite(motion.v).all())
+                errors, note = judge.errors(motion) if finite else ({}, "not a number")
+                run |= {**errors, "outcome": OK if finite else FAILED, "note": note}
         runs.append(run | {"time [ms/s]": 1e3 * seconds / scene.duration})
     return runs
 
 
-def _tried(way: Motion, scene: FixedScene, step: float) -> tuple[Trajectory, float] | Exception:
-    """Return the motion and its least time without the set-up, or the exception of a run.
-
-    The least set-up is subtracted from the least run. The least of the differences would be too short, because it
-    takes the run before which the set-up was disturbed most.
-    """
+def _tried(world: World, scene: Scene) -> tuple[Run, float] | Exception:
+    """Return the run and its least time, or the exception of a run."""
     try:
-        found = [way(scene, step, scene.duration)]
+        found = [world(scene)]
         while len(found) < REPEATS and found[0][1] < ONCE:
-            found.append(way(scene, step, scene.duration))
+            found.append(world(scene))
     except Exception as error:  # engines raise exceptions of any type, and each is a result
         return error
-    return found[-1][0], max(min(spent for _, spent, _ in found) - min(set_up for *_, set_up in found), 0.0)
+    return found[-1][0], min(seconds for _, seconds in found)
 
 
 class Judge:
     """The truth of a scene, the errors of a motion, and bounds of the truth's own errors."""
 
-    def __init__(self, scene: FixedScene) -> None:
-        self.scene = scene
-        self.truth = scene_truth(own_scene(scene, 1e-3, scene.duration), scene.duration, coupled=False)
-        grid = self._at(np.linspace(0.0, scene.duration, 1001))
-        self.kinetic = float(grid.kinetic_energy(scene).max())
-        self.start = float(self._energy(grid)[0])
+    def __init__(self, scene: Scene, length: float) -> None:
+        self.length = length
+        self.gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
+        self.mechanism = mechanism_of(scene)
+        self.truth = scene_truth(scene, scene.duration)
+        q, v = self.truth.state(np.linspace(0.0, scene.duration, 1001))
+        self.kinetic = float(self.mechanism.energies(q, v, self.gravity)[0].max())
+        self.start = float(self._energy(q, v)[0])
         bound, mass = self.truth.bound, sum(body.mass for body in scene.bodies)
-        speed = float(np.linalg.norm(grid.velocity, axis=-1).max())
-        energy = mass * (speed * bound.velocity + float(np.linalg.norm(scene.gravity)) * bound.position)
+        speed = float(np.linalg.norm(v.reshape(len(v), -1, 6)[..., :3], axis=-1).max())
+        energy = mass * (speed * bound.velocity + float(np.linalg.norm(self.gravity)) * bound.position)
         self.bounds = {
-            "position": bound.position * (1.0 + 0.5 * scene.length) / scene.length,  # the second point turns too
+            "position": bound.position * (1.0 + 0.5 * length) / length,  # the second point turns too
             "energy": energy / self.kinetic,
         }
 
-    def errors(self, motion: Trajectory) -> tuple[dict[str, float], str]:
+    def errors(self, run: Run) -> tuple[dict[str, float], str]:
         """Return the errors for the table, at least the truth's bounds, and a note on errors below their bound."""
-        truth = self._at(np.minimum(motion.time, self.truth.end))
-        signed = float(self._energy(motion)[-1] - self._energy(truth)[-1]) / self.kinetic
-        away = max(float(np.linalg.norm(a - b, axis=-1).max())
-                   for a, b in zip(self._points(motion), self._points(truth), strict=True))  # fmt: skip
-        found = {"position": away / self.scene.length, "energy": abs(signed)}
+        kept = slice(None, None, max(1, round(1.0 / (SAMPLES * run.dt))))
+        true_q, true_v = self.truth.state(np.minimum(run.time[kept], self.truth.end))
+        energy = self._energy(run.q[kept], run.v[kept])
+        signed = float(energy[-1] - self._energy(true_q, true_v)[-1]) / self.kinetic
+        away = np.linalg.norm(self._points(run.q[kept]) - self._points(true_q), axis=-1)
+        found = {"position": float(away.max()) / self.length, "energy": abs(signed)}
         below = [name for name, value in found.items() if value < self.bounds[name]]
         found = {name: max(value, self.bounds[name]) for name, value in found.items()}
-        gain = float((self._energy(motion) - self.start).max()) / self.kinetic
+        gain = float((energy - self.start).max()) / self.kinetic
         return found | {"signed energy": float(np.copysign(found["energy"], signed)),
                         "energy made": max(0.0, gain - self.bounds["energy"])}, (
             f"{', '.join(below)} {BELOW}" if below else "")
 
-    def _energy(self, motion: Trajectory) -> Any:
-        return motion.kinetic_energy(self.scene) + motion.potential_energy(self.scene)
+    def _energy(self, q: Floats, v: Floats) -> Floats:
+        kinetic, potential = self.mechanism.energies(q, v, self.gravity)
+        return kinetic + potential
 
-    def _points(self, motion: Trajectory) -> tuple[Floats, Floats]:
-        beside = rotation(motion.orientation) @ np.array([0.5 * self.scene.length, 0.0, 0.0])
-        return motion.position, motion.position + beside
-
-    def _at(self, times: Floats) -> Trajectory:
-        q, v = self.truth.state(times)
-        return Trajectory(times, *world_state(q, v))
-
-
-def _fixed(scene: FixedScene, step: float) -> dict[str, Any]:
-    """Return the paper's walls, the same at every step: 1000 N/m without damping."""
-    return {"stiffness": 1e3, "damping": 0.0, "coherence_distance": 2e-3}
-
-
-def _stiffened(scene: FixedScene, step: float) -> dict[str, Any]:
-    """Return walls that are as stiff as the step allows, with the damping that gives the scene's restitution e.
-
-    A collision of the lightest body at one contact takes 8 steps, as in our settings of MuJoCo; for e = 0 the damping
-    is critical. Where n contacts share a collision, stiffness and damping are n times as large, and e is too small.
-    """
-    mass, stiffness = min(body.mass for body in scene.bodies), (pi / (8.0 * step)) ** 2
-    damping = 2.0 * sqrt(stiffness) if scene.restitution < LOWEST else damping_for(scene.restitution, stiffness)
-    return _fixed(scene, step) | {"stiffness": mass * stiffness, "damping": mass * damping}
-
-
-def _compiled(law_name: str, integrator: str, walls: Callable[[FixedScene, float], dict[str, Any]] = _fixed) -> Motion:
-    """Return the motion function of one of the engine's laws in the compiled loop."""
-
-    def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float, float]:
-        law = getattr(laws, law_name)(integrator=integrator)
-        made = own_scene(scene, step, duration, forces="paper", **walls(scene, step))
-        loop = RecordedLoop(Simulation(made, law), round(duration / step))
-        seconds = loop.sample() * loop.steps
-        run = loop.recording.run("", "")
-        keep = slice(None, None, steps_between_samples(step))
-        q, v = run.q[keep], run.v[keep]
-        return Trajectory(run.time[keep], *world_state(q, v)), seconds, 0.0
-
-    return run
-
-
-def _adapter(name: str) -> Motion:
-    """Return the motion function of an engine with an adapter; its set-up is timed as a run of one step."""
-
-    def run(scene: FixedScene, step: float, duration: float) -> tuple[Trajectory, float, float]:
-        engine = find_simulator(name)
-        settings: Settings = engine.settings(scene, step)
-        engine.run(scene, settings, step, 2.0 * step)  # warm
-        set_up = min(timed(partial(engine.run, scene, settings, step, step))[1] for _ in range(_SET_UPS))
-        motion, spent = timed(partial(engine.run, scene, settings, step, duration))
-        if len(motion.time) < 2:
-            raise IapbError("fewer than two instants were recorded")
-        return motion, spent, set_up
-
-    return run
+    def _points(self, q: Floats) -> Floats:
+        """Return the centre of each body and a point beside it (n, 2 b, 3) [m], in world axes."""
+        pose = self.mechanism.poses(q, planar=False)
+        turned = Rotation.from_quat(pose[..., 3:].reshape(-1, 4)).apply([0.5 * self.length, 0.0, 0.0])
+        center = pose[..., :3]
+        return np.concatenate([center, center + turned.reshape(center.shape)], axis=1)
 
 
 def _motions_say(motions: Table) -> Iterator[Part]:
@@ -422,14 +327,13 @@ def _motions_say(motions: Table) -> Iterator[Part]:
     for scene in dict.fromkeys(motions.where(outcome=OK).column("scene")):
         here = motions.where(scene=scene, outcome=OK).records()
         best = {name: min(chosen, key=lambda run: (run["position"], run["time"]))
-                for name in ("IAPB", "PB", "ideal", "MuJoCo")
-                if (chosen := [run for run in here if run["method"].startswith(name)])}  # fmt: skip
+                for name in dict.fromkeys(run["method"] for run in here)
+                if (chosen := [run for run in here if run["method"] == name])}  # fmt: skip
         ours, theirs, most = best["IAPB"], best.get("MuJoCo"), min(best, key=lambda name: float(best[name]["position"]))
-        as_good = min((run["time"] for run in here if theirs and run["method"].startswith("IAPB")
+        as_good = min((run["time"] for run in here if theirs and run["method"] == "IAPB"
                        and run["position"] <= theirs["position"]), default=inf)  # fmt: skip
         exact, fast = ours["position"] <= best[most]["position"], theirs is None or as_good <= theirs["time"]
-        text = "; ".join(f"{SHORT.get(run['method'], name)}: {_error(run)} ({_took(run['time'])})"
-                         for name, run in best.items())
+        text = "; ".join(f"{name}: {_error(run)} ({_took(run['time'])})" for name, run in best.items())
         more = f". IAPB reaches MuJoCo's error in {_took(as_good)}" if as_good < inf else ""
         yield target(f"Whole motion ({scene}): the smallest position error that any tried time step reaches, in % of "
                      "the body's length (and the computing time per simulated second)", f"{text}{more}",
@@ -458,8 +362,8 @@ MOTIONS = Check(
     "relative to the largest kinetic energy. An error below the error bound of the truth is replaced by this bound.",
 )  # fmt: skip
 WORTH = Check(
-    key="worth", question="Which method is worth its time?", row=lambda _, row: row, digits=2,
-    cases=lambda study: worth(study.table(MOTIONS), WORLDS).by_title(), timed=(
+    key="worth", question="Which world is worth its time?", row=lambda _, row: row, digits=2,
+    cases=lambda study: worth(study.table(MOTIONS)).by_title(), timed=(
         "tenfold accuracy costs", "least cost", "largest cost", "scenes fitted", "error stays", "least error",
         "best for its time", "scenes", "most exact there", "least exact there", "energy made", "cut short", "failed"),
     note="Errors are position errors in body lengths. The factor in time for a tenth of the error is a median over "
