@@ -15,9 +15,9 @@ from iapb.contact.geometry import ContactBuffer, contact_capacity
 from iapb.contact.kernels.broadphase import make_broad_phase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
+from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
-from iapb.contact.kernels.step_friction import RestWork
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.contact.kernels.world import State, Switches, World
 from iapb.contact.laws import ImpulseAugmented
@@ -37,7 +37,7 @@ from iapb.schema import blank, quantities, zeros_of
 _factored = Entry(cholesky)
 
 # Effects whose kernels are compiled only where they are on.
-_COMPILED = ("impact_friction", "unequal_restitution", "joint_damping", "clustering", "joint_limits")
+_COMPILED = ("impact_friction", "friction", "unequal_restitution", "joint_damping", "clustering", "joint_limits")
 _CONTACT_NUMBERS = ("stiffness", "damping", "friction_velocity", "approach_velocity", "cluster_distance",
                     "coherence_distance")
 
@@ -141,7 +141,6 @@ class System:
             tree_stop=np.ascontiguousarray(ranges[:, 1]), switches=switches, dt=self.dt, gravity=self.gravity,
             **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS}, clamped=contact.penalty == "clamped",
             friction_class=self.frictions.class_of_shape, friction=self.frictions.table,
-            coulomb=flag("friction" in on and (contact.friction_law == "coulomb" or contact.forces == "implicit")),
             implicit=flag(contact.forces == "implicit"), explicit=flag(contact.forces != "implicit"),
             tangents=self.tangents,
             restitution=float(self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution),
@@ -161,9 +160,8 @@ class System:
         largest = max((stop - start for start, stop in mechanism.tree_dofs), default=0)
         per_body = contact.self_collision_rows == "per_body"
         rows = c * (2 if per_body else 1)  # (13)-(14): two each
-        rubbing = scene.largest_friction > 0.0
-        sliding = rubbing and not per_body  # per-body rows have no slip, so no friction in impacts
-        soft = contact.forces == "implicit" or rubbing and contact.friction_law == "coulomb"
+        sliding = scene.largest_friction > 0.0 and not per_body  # per-body rows have no slip: no friction in impacts
+        soft = contact.forces == "implicit"
         log = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
         for name, value in {"scale": 1, "clamp": 1, "friction_share": 1, "solved": 1, "approaching": -1}.items():
             log[name][:] = value  # where a law written in Python does not set it
@@ -175,7 +173,7 @@ class System:
             friction_work=zeros_of(FrictionWork, velocity=d * sliding, row=rows * sliding,
                                    tangent=rows * tangents * sliding, direction=tangents),
             rest_work=zeros_of(RestWork, velocity=d * soft, contact=c * soft, row=c * (1 + tangents) * soft,
-                               width=2 * largest, direction=tangents, tree=trees),
+                               width=2 * largest, tree=trees),
             impacts={"logged": np.zeros(1, np.int64), **log},
         )
         state.q[:], state.v[:] = self.start

@@ -456,9 +456,9 @@ def _sags(start: Start) -> Iterator[Caution]:
 
 
 def _overdriven_friction(start: Start) -> Iterator[Caution]:
-    """Warn where regularised friction (6), an explicit damper μN/v_thr, reverses a motion within a step."""
+    """Warn where friction (6), an explicit damper μN/v_thr, reverses a motion within a step."""
     contact, worst, where = start.scene.contact, 2.0, ""
-    for rows in start.supports if contact.friction_law == "regularised" else ():
+    for rows in start.supports:
         root = np.sqrt(start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity)
         tangents = [r * row for i, r in zip(rows, root, strict=True) if r > 0.0 for row in start.slips(i)]
         found = start.mobility(np.array(tangents))
@@ -467,7 +467,7 @@ def _overdriven_friction(start: Start) -> Iterator[Caution]:
     if where:
         yield Caution("friction", where, f"friction (6) at {where} turns motion round within a step, {0.5 * worst:.3g} "
                       "times beyond its limit μ N Δt = 2 m v_threshold: set contact.friction_velocity >= "
-                      f"{_up(contact.friction_velocity * worst / 2.0):g}, or contact.friction_law: coulomb")
+                      f"{_up(contact.friction_velocity * worst / 2.0):g}, or contact.forces: implicit")
 
 
 def _up(x: float, way: Callable[[float], int] = math.ceil, slack: float = 1.0 - ROUNDED) -> float:

@@ -70,8 +70,9 @@ class Contact(ScenePart):
     auto: Truth = Field(False, description="true: stiffness, damping and coherence_distance are chosen from masses, "
         "sizes, gravity and rate where they are not given; contact: auto is short for it; default false")
     forces: Literal["implicit", "paper"] = Field("implicit", description="implicit (default): resting forces that no "
-        "stiffness or step makes unstable, friction in impacts, stiffness and damping chosen for a sag below 0.1 mm; "
-        "paper: explicit (5), impacts without friction, K = 1000, B = 50; contact: paper is short for it")
+        "stiffness or step makes unstable, Coulomb's friction, also in impacts, stiffness and damping chosen for a sag "
+        "below 0.1 mm; paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; contact: paper is "
+        "short for it")
     stiffness: Gain = Field(1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen")
     damping: Gain = Field(50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen")
     penalty: Literal["clamped", "printed"] = Field("clamped", description="clamped (default): never pulls; printed: "
@@ -79,10 +80,8 @@ class Contact(ScenePart):
     friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")
     friction_pairs: Annotated[tuple[FrictionPair, ...], Field(max_length=MAX_PAIRS)] = Field(
         (), description="coefficients of single pairs; they come before what bodies and walls give; default: none")
-    friction_law: Literal["coulomb", "regularised"] = Field("coulomb", description="coulomb (default): sticks and "
-        "slides, implicit in the step; regularised: the paper's explicit (6)")
-    friction_velocity: Positive = Field(1e-3, description="v_threshold of (6) [m/s]: below it regularised friction "
-        "grows linearly; default 1e-3, ours")
+    friction_velocity: Positive = Field(1e-3, description="v_threshold of (6) [m/s], with forces: paper: below it "
+        "friction grows linearly; default 1e-3, ours")
     restitution: Fraction = Field(0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0")
     approach_velocity: NonNegative = Field(1e-6, description="v_approach [m/s]: contacts that approach faster "
         "collide; default 1e-6, ours")

@@ -179,7 +179,7 @@ def test_a_run_shows_itself_in_a_line_a_table_a_picture_and_as_a_dataset():
 
 
 CHANGES = [  # what scenes with equal bodies or walls might share
-    {}, {"contact.friction": 0.2, "contact.friction_law": "coulomb"}, {"contact.restitution": 0.5},
+    {}, {"contact.friction": 0.2, "contact.forces": "implicit"}, {"contact.restitution": 0.5},
     {"walls.floor.restitution": 0.6}, {"bodies.peg.mass": 1.5}, {"bodies.peg.position": [0.021, -0.0135, 0.02]},
     {"bodies.peg.joint_damping": [1.0, 1.0, 0.0]}, {"rate": 700.0}, {"hand.point": [0.005, 0.002]},
     {"hand.force_function": ["0.1*sin(9*t)", "0", "0"]}, {"device.delay": 3},

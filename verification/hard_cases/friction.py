@@ -28,6 +28,7 @@ from verification.hard_cases.case import (
 )
 
 _G = 9.81
+_IMPLICIT = {"forces": "implicit"}
 _WORLDS = ("IAPB", "PB", COULOMB)
 
 # --- Kane and Levinson's double pendulum -----------------------------------------------------------------------
@@ -40,7 +41,7 @@ _PENDULUM = [
      "shapes": [{"kind": "circle", "radius": 1e-6, "center": [1.0, 0.0]}],
      "position": [math.atan2(8, 15) - math.atan2(5, 12)]},
 ]  # fmt: skip
-_ON_TIP = {"restitution": 0.5, "friction": 0.5, "stiffness": 1e4, "damping": 100.0,
+_ON_TIP = _IMPLICIT | {"restitution": 0.5, "friction": 0.5, "stiffness": 1e4, "damping": 100.0,
            "coherence_distance": 1e-2}  # fmt: skip
 
 
@@ -122,17 +123,17 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
         "Creep of the regularised law, 1 % below the threshold", "(6) of the paper",
         "the paper's law (6) never sticks: the block must creep at the speed that the law gives, no faster",
         "after a few steps the block creeps at 0.99 times 1 mm/s, the speed below which (6) is viscous",
-        "equation (6) of the paper for one coordinate, step by step", _block(0.99, "regularised"), measure,
+        "equation (6) of the paper for one coordinate, step by step", _block(0.99, "paper"), measure,
         ("IAPB", "PB"),
     )  # fmt: skip
 
 
-def _block(share: float, law: str = "coulomb") -> Scene:
+def _block(share: float, forces: str = "implicit") -> Scene:
     depth = _G / (2.0 * 1e4)  # static overlap of the block on two springs; friction acts at half of it
     block = {"name": "block", "joint": "planar", "mass": 1.0, "inertia": 0.0020833333333333333,
              "shapes": [{"kind": "box", "size": [0.15, 0.05]}], "position": [0.0, 0.025 - depth, 0.0]}
     hand = {"body": "block", "point": [0.0, -(0.025 - 0.5 * depth)], "force": [share * _MU * _G, 0.0, 0.0]}
-    contact = {"stiffness": 1e4, "damping": 100.0, "friction": _MU, "friction_law": law, "friction_velocity": _CREEP,
+    contact = {"forces": forces, "stiffness": 1e4, "damping": 100.0, "friction": _MU, "friction_velocity": _CREEP,
                "coherence_distance": 2e-3}
     return on_floor("pushed_block", "A block pushed along the floor", [block], contact, rate=4000, duration=_DURATION,
                     hand=hand)  # fmt: skip
@@ -159,13 +160,13 @@ def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
 # --- Painlevé's rod -------------------------------------------------------------------------------------------
 _SINE, _COSINE, _ROUGH, _SPEED, _STIFF = 0.8, 0.6, 2.0, 1.0, 1e4
 _HEIGHT = 0.5 * _SINE + 1e-6 - 1e-9  # of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
-_STOPPED_SLIP = 1e-3  # [m/s] v_threshold of (6): below it friction decreases
+_MOBILITY = 1.0 + 3.0 * _COSINE * (_COSINE - _ROUGH * _SINE)  # [1/kg] of the sliding contact: negative
+_GROWTH = math.sqrt(-_MOBILITY * _STIFF)  # [1/s] σ: the overlap grows as exp(σ t) at first
 
 _ROD = {"name": "rod", "joint": "planar", "mass": 1.0, "inertia": 1.0 / 12.0, "velocity": [-_SPEED, 0.0, 0.0],
         "shapes": [{"kind": "circle", "radius": 1e-6, "center": [-0.5, 0.0]}],
         "position": [0.0, _HEIGHT, math.atan2(_SINE, _COSINE)]}  # fmt: skip
-_ON_END = {"stiffness": _STIFF, "damping": 0.0, "friction": _ROUGH, "friction_velocity": _STOPPED_SLIP,
-           "coherence_distance": 5e-3}  # fmt: skip
+_ON_END = _IMPLICIT | {"stiffness": _STIFF, "damping": 0.0, "friction": _ROUGH, "coherence_distance": 5e-3}
 
 
 def painleve_rod() -> TrajectoryCase:
@@ -177,7 +178,7 @@ def painleve_rod() -> TrajectoryCase:
         "and with springs the force grows without bound",
         "the rod jams: with a rigid contact at once, with a spring as soon as the force is large enough",
         f"the equations of motion: with springs the slip stops after {1e3 * _slipping()[0]:.1f} ms; if rigid, at once",
-        on_floor("painleve_rod", "Painlevé's rod", [_ROD], _ON_END, source="Painlevé (1895)", rate=4000, duration=0.1),
+        on_floor("painleve_rod", "Painlevé's rod", [_ROD], _ON_END, source="Painlevé (1895)", rate=8000, duration=0.1),
         _measure_rod, _WORLDS,
     )  # fmt: skip
 
@@ -195,7 +196,7 @@ def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float
         return np.array([*state[3:], _ROUGH * push, push - _G, turn])
 
     def stops(_: float, state: NDArray[np.float64]) -> float:
-        return float(slip(state)) + _STOPPED_SLIP
+        return float(slip(state))
 
     start = [0.0, _HEIGHT, math.atan2(_SINE, _COSINE), -_SPEED, 0.0, 0.0]
     end, motion = _until(stops, rate, start, 1e-11, 1e-13)
@@ -206,8 +207,10 @@ def _measure_rod(run: Run) -> Measured:
     """Measure the largest error of the slip speed until it stops, relative to the initial slip speed.
 
     A rigid world must have no slip after the first step, except for the rotation of the rod within a step. With springs
-    a first-order method may start or stop the slip one step late or early, so the bound is the largest change of the
-    slip speed in one step.
+    a first-order method may start or stop the slip one step late or early. Implicit contact is also early because its
+    force acts at the end of the step, as if the spring had a damper KΔt: the overlap then grows at the rate
+    σ + ½ σ² Δt instead of σ, so after the time t it is ahead by ½ σ t steps. The bound is the largest change of the
+    slip speed in one step, times these steps.
     """
     slip = run.v[:, 0] + 0.5 * np.sin(run.q[:, 2]) * run.v[:, 2]
     end, truth = _slipping()
@@ -216,49 +219,52 @@ def _measure_rod(run: Run) -> Measured:
     slipping = run.time < end
     true = truth(run.time[slipping])
     steepest = float(np.abs(np.diff(true)).max())
-    return Measured(largest_gain(run), NO_GAIN, float(np.abs(slip[slipping] - true).max()) / _SPEED, steepest / _SPEED)
+    early = (1.0 + 0.5 * _GROWTH * end) * steepest
+    return Measured(largest_gain(run), NO_GAIN, float(np.abs(slip[slipping] - true).max()) / _SPEED, early / _SPEED)
 
 
 # --- a plate pushed by a spring: stick-slip -----------------------------------------------------------------------
 # The spring is a contact: a ball of 1e8 kg with constant speed presses on the edge of a plate of 1 kg.
-_PRESS, _STEADY, _PRESSED = 1e4, 0.01, 0.5  # spring [N/m], speed of the ball [m/s], duration [s]
-_OMEGA = math.sqrt(_PRESS)
+_PRESS, _PRESSED = 1e4, 0.5  # spring [N/m], duration [s]
+_DAMPED = 10.0  # damper of the contact [N s/m]
+_STEADY = 0.01  # speed of the ball [m/s]
+_OMEGA = math.sqrt(_PRESS)  # [rad/s] of the plate on the spring, without the damper
+_DECAY = 0.5 * _DAMPED  # [1/s] of its swing
+_SWING = math.sqrt(_OMEGA**2 - _DECAY**2)  # [rad/s] with the damper
 _SLIDING = _MU * _G / _PRESS  # the spring's depth [m] in steady sliding; the start has 1.5 times this depth
 _THICK, _THIN = 2e-3, 4e-4  # the plate's height and the ball's radius [m]
-# Errors of a first-order step: the stick before the cycle begins and ends up to one step late. In the cycle each stick,
-# whose exact duration is zero, lasts up to one step.
-_LATE = 4.0
+# Error of a step Δt in units of ωΔt times the swing V/ω. The force acts at the end of the step, as if the contact had
+# another damper KΔt, so the swing decays faster by ω²Δt/2. It loses ½ω²Δt t exp(−at) of its size, at most
+# ω²Δt/(2 e a), with a the decay rate and e Euler's number. The stick begins and ends up to one step late.
+_LATE = _OMEGA / (2.0 * math.e * _DECAY) + 2.0
 
 
 def stick_slip() -> TrajectoryCase:
-    """A plate of 1 kg on a rough floor, pushed by a spring whose other end moves at constant speed."""
-    amplitude, depth = _STEADY / _OMEGA, 1.5 * _SLIDING
+    """A plate of 1 kg on a rough floor, pushed by a spring and damper whose other end moves at constant speed."""
+    swing, depth = _STEADY / _OMEGA, 1.5 * _SLIDING
     height = 0.5 * _THICK - _G / (2.0 * _PRESS)
     plate = {"name": "plate", "joint": "planar", "mass": 1.0, "inertia": 0.001875, "velocity": [_STEADY, 0.0, 0.0],
              "shapes": [{"kind": "box", "size": [0.15, _THICK]}], "position": [0.0, height, 0.0]}
     presses = ball("ball", _THIN, 0.0, origin=[-0.075 - _THIN + depth, height], mass=1e8, velocity=[_STEADY])
-    contact = {"stiffness": _PRESS, "damping": 0.0, "friction": _MU, "coherence_distance": 2e-3}
+    contact = _IMPLICIT | {"stiffness": _PRESS, "damping": _DAMPED, "friction": _MU, "coherence_distance": 2e-3}
 
     def measure(run: Run) -> Measured:
-        """Measure the largest distance from the closed form, relative to the cycle's amplitude, and the energy gain.
+        """Measure the largest distance from the closed form, relative to the swing V/ω, and the energy gain.
 
-        The energy is measured in the frame of the ball, (v − V)² / 2 + K u² / 2. It is constant while the plate slides
-        and decreases while it sticks. The symplectic step lets it oscillate by ω Δt.
+        The energy is measured in the frame of the ball, (v − V)² / 2 + K u² / 2. The damper takes some of it while the
+        plate slides, friction while it sticks.
         """
         u = _STEADY * run.time - run.q[:, 0] + 0.5 * _SLIDING
         held = (run.v[:, 0] - _STEADY) ** 2 + _PRESS * u**2
-        off = float(np.abs(run.q[:, 0] - pushed_plate(run.time)).max()) / amplitude
-        gain = float(held.max() / held[0]) - 1.0
-        return Measured(gain, _OMEGA * run.dt, off, _LATE * _STEADY * run.dt / amplitude)
+        off = float(np.abs(run.q[:, 0] - pushed_plate(run.time)).max()) / swing
+        return Measured(float(held.max() / held[0]) - 1.0, NO_GAIN, off, _LATE * _OMEGA * run.dt)
 
     return TrajectoryCase(
-        "Stick-slip oscillator and its limit cycle",
-        "Den Hartog, Trans. ASME 53 (1931); the textbooks' block on a belt",
-        "a spring pushes a plate: in the limit cycle the plate is at rest for only an instant of each period, with the "
-        "friction force exactly at its limit μ m g",
-        "the plate slides, sticks once, and then repeats the limit cycle, of period 2π/ω, for ever",
-        "closed form: harmonic while the plate slides, at rest while the spring presses less than μ m g; limit cycle "
-        "v = V (1 − cos ωt), with V the speed of the spring's other end and ω the frequency of the plate on the spring",
+        "Stick-slip of a plate that a spring pushes",
+        "Den Hartog, Trans. ASME 53 (1931); the textbooks' block on a belt; the damper is ours",
+        "the plate stops and starts again where the forces on it are exactly at the limit of friction, μ m g",
+        "the plate slides, sticks once, and slides on; its swing on the spring decays, so it never sticks again",
+        "closed form: a damped swing while the plate slides, at rest while spring and damper press less than μ m g",
         on_floor("stick_slip", "A plate pushed by a spring", [plate, presses], contact, rate=4000, duration=_PRESSED),
         measure, ("IAPB", "PB"),
     )  # fmt: skip
@@ -267,14 +273,33 @@ def stick_slip() -> TrajectoryCase:
 def pushed_plate(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the position of the plate [m]; u is the spring's depth minus that of steady sliding.
 
-    While the plate slides, u'' = −ω² u. It starts with u₀ at the ball's speed, comes to rest at u = −√(u₀² − V²/ω²),
-    and slides again from u = 0 on.
+    While the plate slides, u'' = −ω² u − 2 a u'. It starts with u₀ at the ball's speed V, and stops where u' = V. It
+    slides again where spring and damper press with the limit of friction, ω² u + 2 a V = 0.
     """
-    u, way = 0.5 * _SLIDING, _STEADY / _OMEGA
-    stops = (math.pi + math.asin(way / u)) / _OMEGA
-    last = -math.sqrt(u * u - way * way)
-    starts = stops - last / _STEADY
-    first = u + _STEADY * time - u * np.cos(_OMEGA * time)
-    held, since = u + _STEADY * stops - last, time - starts
-    cycle = held + _STEADY * since - way * np.sin(_OMEGA * since)
-    return np.asarray(np.select([time < stops, time < starts], [first, np.full_like(time, held)], cycle), np.float64)
+    u0 = 0.5 * _SLIDING
+    stops = _stopping(u0)
+    starts_at = -2.0 * _DECAY * _STEADY / _OMEGA**2
+    stopped_at = float(_swing(np.array(stops), u0, _DECAY * u0))
+    starts = stops + (starts_at - stopped_at) / _STEADY
+    first = u0 + _STEADY * time - _swing(time, u0, _DECAY * u0)
+    held = u0 + _STEADY * stops - stopped_at
+    again = _swing(time - starts, starts_at, _STEADY + _DECAY * starts_at)
+    last = held + _STEADY * (time - starts) + starts_at - again
+    return np.asarray(np.select([time < stops, time < starts], [first, np.full_like(time, held)], last), np.float64)
+
+
+def _swing(time: NDArray[np.float64], place: float, push: float) -> NDArray[np.float64]:
+    """Return u(t) = exp(−a t) (u(0) cos Ωt + (u'(0) + a u(0)) sin(Ωt) / Ω) [m]; `push` is u'(0) + a u(0) [m/s]."""
+    swung = place * np.cos(_SWING * time) + push / _SWING * np.sin(_SWING * time)
+    return np.asarray(np.exp(-_DECAY * time) * swung, np.float64)
+
+
+@cache
+def _stopping(u0: float) -> float:
+    """Return the first time [s] at which u' = V, from u(0) = u₀ and u'(0) = 0 on."""
+    from scipy.optimize import brentq
+
+    def too_slow(time: float) -> float:
+        return -math.exp(-_DECAY * time) * _OMEGA**2 * u0 / _SWING * math.sin(_SWING * time) - _STEADY
+
+    return float(brentq(too_slow, math.pi / _SWING, 1.5 * math.pi / _SWING, xtol=1e-15))

@@ -28,7 +28,8 @@ import numpy as np
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import IapbError, RangeError
 from iapb.run import Run
-from iapb.scene import Scene, find_scene, load_scene
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
 from reference.exact import fractions_of, rational_matrix, relative_energy_gain
 from reference.one_thread import one_thread
@@ -170,20 +171,31 @@ def faulty_motion(run: Run, fault: float) -> Run:
 
 
 def restitution_residual(run: Run) -> float:
-    """Return the largest |P·v⁺ + e P·v⁻| / P·(v⁺ − v⁻) of all collisions; NaN if there is no collision to judge.
+    """Return the largest |p·γ⁺ + e p·γ⁻| / p·(γ⁺ − γ⁻) of all steps with collisions; NaN if there is none to judge.
 
-    P = Jᵀp is the generalized impulse of a collision, so P·v sums the normal velocities with the impulses as weights,
-    and P·(v⁺ − v⁻) = |Δu|² > 0. If every row satisfies J v⁺ = −e J v⁻, the residual is zero. For a rigid world the
-    result is NaN, because its impulses also close gaps and carry the forces of the step.
+    p are the normal impulses of the step's contacts, γ⁻ and γ⁺ their normal velocities before and after the impact. If
+    every contact that pushes satisfies γ⁺ = −e γ⁻, the residual is zero. For a rigid world the result is NaN, because
+    its impulses also close gaps and carry the forces of the step.
     """
-    if run.law == "rigid constraints":
+    contacts, impacts = run.contacts, run.impacts
+    struck = np.flatnonzero(contacts.impulse)
+    if run.law == "rigid constraints" or not len(struck):
+        return math.nan
+    step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))[struck]
+    mechanism, q = mechanism_of(scene_from_text(run.scene_source)), run.q[step]
+    point, normal = contacts.point[struck], contacts.normal[struck]
+    rows = mechanism.rows_along(q, contacts.body_a[struck], point, normal)
+    rows -= mechanism.rows_along(q, contacts.body_b[struck], point, normal)
+    rows *= contacts.impulse[struck, None]
+    v_minus = impacts.v_minus[np.searchsorted(impacts.step, step)]
+    v_plus = impacts.v_plus[np.searchsorted(impacts.step, step, side="right") - 1]
+    before = np.bincount(step, np.einsum("kd,kd->k", rows, v_minus))
+    after = np.bincount(step, np.einsum("kd,kd->k", rows, v_plus))
+    judged = after - before > 0.0
+    if not judged.any():
         return math.nan
     e = float(run.scene_resolved["contact"]["restitution"])
-    before, after = (np.einsum("kd,kd->k", run.impacts.impulse, v) for v in (run.impacts.v_minus, run.impacts.v_plus))
-    struck = after - before > 0.0
-    if not struck.any():
-        return math.nan
-    return float(np.max(np.abs(after + e * before)[struck] / (after - before)[struck]))
+    return float(np.max(np.abs(after + e * before)[judged] / (after - before)[judged]))
 
 
 class TimedOut(IapbError):

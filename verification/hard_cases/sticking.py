@@ -33,7 +33,8 @@ def _boxes(
         boxes.append({"name": f"box_{k}", "joint": "planar", "mass": 1.0, "inertia": (width**2 + height**2) / 12.0,
                       "position": [0.0, level - 0.5 * height, 0.0], "velocity": [speed, 0.0, 0.0],
                       "shapes": [{"kind": "box", "size": [width, height]}]})  # fmt: skip
-    contact = {"stiffness": stiffness, "damping": 50.0, "friction": _MU, "coherence_distance": 2e-3}
+    contact = {"forces": "implicit", "stiffness": stiffness, "damping": 50.0, "friction": _MU,
+               "coherence_distance": 2e-3}
     return on_floor(name, title, boxes, contact, duration=_LONG,
                     gravity=(_G * math.sin(slope), -_G * math.cos(slope)))  # fmt: skip
 

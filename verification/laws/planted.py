@@ -16,6 +16,7 @@ from verification.impacts import Floats, ImpactCase
 from verification.laws.engine import Wall, saturated
 from verification.laws.resolver import RANK_CUT, Resolver, projecting, row_space, sound_resolver, whitened
 from verification.laws.scenes import SceneCase
+from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
 from verification.stability.device_port import DeviceLoop, actuator_forces
 
 
@@ -249,12 +250,12 @@ def unclamped_friction(case: SceneCase) -> Run | None:
     return replace(run, contacts=replace(contacts, friction_force=1.5 * contacts.friction_force)) if slides else None
 
 
-def explicit_friction(case: SceneCase) -> Run | None:
+def overdriven_friction(case: SceneCase) -> Run | None:
     """Simulates (6) instead of Coulomb's law; for its threshold velocity the step is too long, so it drives bodies."""
     contact = case.values["contact"]
-    if not contact.get("friction") or contact.get("friction_law") == "regularised":
+    if not contact.get("friction") or contact["forces"] == "paper":
         return None
-    run = _simulated_as(case, friction_law="regularised", friction_velocity=1e-6)
+    run = _simulated_as(case, forces="paper", friction_velocity=1e-6)
     return run if np.any(np.diff(run.energy["friction_work"]) > 0.0) else None
 
 
@@ -277,11 +278,18 @@ PLANTED_TRAJECTORY_FAULTS: dict[str, Callable[[SceneCase], Run | None]] = {
     "ledger": missing_half,
     "penalty": unclamped_penalty,
     "friction": unclamped_friction,
-    "friction_work": explicit_friction,
+    "friction_work": overdriven_friction,
     "device_limits": device_beyond_its_limits,
 }
 
 
 def first_occasion(law: str, scenes: list[SceneCase]) -> Run | None:
-    """Return the run with the law's fault in the first scene in which the fault has an effect, or None."""
-    return next((run for case in scenes if (run := PLANTED_TRAJECTORY_FAULTS[law](case)) is not None), None)
+    """Return the run with the law's fault in the first scene to which the law applies and the fault makes a difference.
+
+    None if there is no such scene.
+    """
+    for case in scenes:
+        run = PLANTED_TRAJECTORY_FAULTS[law](case)
+        if run is not None and TRAJECTORY_LAWS[law].check(Trajectory(run)) is not None:
+            return run
+    return None

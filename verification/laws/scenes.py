@@ -152,8 +152,8 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     }  # fmt: skip
     if rng.random() < 0.4:
         friction = round(rng.uniform(0.05, 1.0), 3)
-        law = "regularised" if round(1e3 * friction) % 3 == 0 else "coulomb"  # no draw: all other values stay the same
-        contact |= {"friction": friction, "friction_velocity": 1e-2, "friction_law": law}
+        forces = "paper" if round(1e3 * friction) % 3 == 0 else "implicit"  # no draw: all other values stay the same
+        contact |= {"forces": forces, "friction": friction, "friction_velocity": 1e-2}
     if rng.random() < 0.5:
         contact["coherence_distance"] = 1e-2
     if rng.random() < 0.3:

@@ -42,6 +42,11 @@ class Trajectory:
         return self.run.law in BY_THE_ENGINE and self.run.law_settings.get("integrator") == "semi_implicit_euler"
 
     @property
+    def implicit(self) -> bool:
+        """Whether the forces of resting contacts follow from the velocity at the end of the step."""
+        return bool(self.run.scene_resolved["contact"]["forces"] == "implicit")
+
+    @property
     def is_explained(self) -> bool:
         """Whether all that moves the bodies is recorded: a unilateral coupler moves the tool from outside."""
         return self.by_the_engine and self.run.coupling != "unilateral"
@@ -150,8 +155,9 @@ def forces_explain_motion(trajectory: Trajectory) -> Found:
     """Largest |M Δv − Δt (Σ F − B − G)|∞ over |M|(|v| + |v'|) + Δt Σ|F|, in units of d ε.
 
     There is one scale per step, not per coordinate, because a force on one link causes rounding in the other equations.
+    Implicit contact is not checked: an iteration finds its forces, to less than rounding.
     """
-    if not trajectory.is_explained:
+    if not trajectory.is_explained or trajectory.implicit:
         return None
     run, masses = trajectory.run, trajectory.masses
     changed = np.einsum("kij,kj->ki", masses, run.v[1:] - trajectory.v_struck)
@@ -207,11 +213,11 @@ def _residuals(trajectory: Trajectory) -> tuple[Floats, Floats]:
     """Energy error of the integration, recorded and as computed from the method.
 
     Semi-implicit Euler loses ½ Δv·M Δv per step, with Δv due to the forces, and takes the weight −G as constant over a
-    step. Both are 0 if M varies or if a spatial body turns by half a turn in a step, because its displacement then
-    differs from the integrated motion.
+    step. Both are 0 if M varies, if contact is implicit (an iteration finds its forces, to less than rounding), or if a
+    spatial body turns by half a turn in a step, because its displacement then differs from the integrated motion.
     """
     run = trajectory.run
-    if trajectory.turns_over or not trajectory.system.mechanism.has_constant_mass_matrix:
+    if trajectory.implicit or trajectory.turns_over or not trajectory.system.mechanism.has_constant_mass_matrix:
         return np.zeros(1), np.zeros(1)
     dv = run.v[1:] - trajectory.v_struck
     lost = 0.5 * np.einsum("ni,nij,nj->n", dv, trajectory.masses, dv)
@@ -226,7 +232,7 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> Found:
     A contact pulls only if the scene selects the `printed` penalty; otherwise a pull is infinite.
     """
     run, contacts = trajectory.run, trajectory.run.contacts
-    if not trajectory.by_the_engine or not len(contacts.gap):
+    if not trajectory.by_the_engine or trajectory.implicit or not len(contacts.gap):
         return None
     constants = run.scene_resolved["contact"]
     K, B = constants["stiffness"], constants["damping"]
@@ -242,13 +248,13 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> Found:
 
 @law(TRAJECTORY_LAWS, "friction", "friction stays in its cone")
 def friction_stays_in_its_cone(trajectory: Trajectory) -> Found:
-    """(6) and Coulomb's law: largest of |F_f| − μ F_n and |F_f · n|, relative to μ F_n; infinite if μ F_n = 0.
+    """(6): largest of |F_f| − μ F_n and |F_f · n|, relative to μ F_n; infinite if μ F_n = 0.
 
     Subtracting v_n from the velocity rounds v_t by ε |v_n|, and (6) divides by v_threshold or more; the tolerance
     covers this error.
     """
     run, contacts = trajectory.run, trajectory.run.contacts
-    if not trajectory.by_the_engine or not len(contacts.gap):
+    if not trajectory.by_the_engine or trajectory.implicit or not len(contacts.gap):
         return None
     most = trajectory.system.scene.largest_friction * np.maximum(contacts.normal_force, 0.0)
     length = np.linalg.norm(contacts.friction_force, axis=1)
@@ -259,14 +265,13 @@ def friction_stays_in_its_cone(trajectory: Trajectory) -> Found:
 
 @law(TRAJECTORY_LAWS, "friction_work", "friction does no positive work in any step")
 def friction_takes_energy(trajectory: Trajectory) -> Found:
-    """Largest F_f · Δq of a step, relative to the rounding of that sum; the paper's explicit (6) is not checked.
+    """Largest F_f · Δq of a step of implicit contact, relative to the rounding of that sum; (6) may do positive work.
 
     The work of a sticking contact is only rounding: each entry of Δq is the difference of two coordinates, and each
     entry of F_f is a sum over the contacts, whose terms may cancel.
     """
     run, contacts = trajectory.run, trajectory.run.contacts
-    explicit = run.scene_resolved["contact"].get("friction_law", "regularised") != "coulomb"
-    if explicit or run.law not in ENGINE_LAWS or not np.any(run.friction_force) or trajectory.turns_over:
+    if not trajectory.implicit or run.law not in ENGINE_LAWS or not np.any(run.friction_force) or trajectory.turns_over:
         return None
     moved = trajectory.displacements
     work = np.einsum("nd,nd->n", run.friction_force, moved)

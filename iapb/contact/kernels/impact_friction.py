@@ -25,7 +25,7 @@ from iapb.contact.kernels.row_basis import add_minimum_norm, minimum_norm_factor
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
 from iapb.linalg import add_multiple, dot_of, from_whitened, orthogonalize
-from iapb.schema import Floats, Integers
+from iapb.schema import Floats
 
 GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 
@@ -33,8 +33,6 @@ GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the
 class FrictionWork(NamedTuple):
     """Scratch of the friction of one impact: each row is a contact with 1 (planar) or 2 (spatial) tangents."""
 
-    at: Annotated[Integers, "row 2"]  # 0, and
-    size: Annotated[Integers, "row 2"]  # the number of coordinates and 0, as the rows have one part: see `along_row`
     rows: Annotated[Floats, "tangent velocity"]  # tangents' rows of J, then of A, then B
     normal_part: Annotated[Floats, "tangent velocity"]  # A_t Qᵀ: the removed part, along the basis
     speed: Annotated[Floats, "tangent"]  # tangential velocity after the normal impact [m/s]
@@ -78,7 +76,7 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     scale = math.sqrt(largest) * math.sqrt(dot_of(u, u))  # of the rounding of a tangential velocity [m/s]
     met = settle_friction(count, rank, work, push, f, d, scale, only_push, impulses)
     share = share_within_cone(count, f)
-    combine(count, f)
+    combine(count, f, d)
     for k in range(d):
         moved[k] *= share
     alpha = passive_share(u, change, moved)
@@ -169,7 +167,6 @@ def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
     """
     size = f.velocity.shape[0]
     for i in range(count):
-        f.size[i, 0] = d
         set_inertia(f, i, d)
     f.p[: count * size] = 0.0
     if _start(count, rank, work, push, f, d) and _settle(count, rank, work, f, d, scale, True):
@@ -186,7 +183,7 @@ def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
         return True
     for i in range(count):
         f.limit[i] = f.sliding[i] * max(f.without[i], 0.0)
-    friction_sweeps(count, f, HELD_SWEEPS, STILL * scale, True)
+    friction_sweeps(count, f, d, HELD_SWEEPS, STILL * scale)
     _move_normals(count, rank, work, f, only_push)
     return False
 
@@ -204,12 +201,11 @@ def sweep_impact(d, count, work, f, impulses):
         whiten_row(work.lower, f.rows[j, :d])
         f.speed[j] = dot_of(f.rows[j, :d], u)
     for i in range(count):
-        f.size[i, 0] = d
         set_inertia(f, i, d)
         p_n[i] = impulses[i] * work.length[i]
     speed, fastest = math.sqrt(dot_of(u, u)), math.inf
     for _ in range(IMPACT_SWEEPS):
-        combine(count, f)
+        combine(count, f, d)
         for k in range(d):
             for i in range(count):
                 moved[k] += work.rows[k, i] * p_n[i]
@@ -225,7 +221,7 @@ def sweep_impact(d, count, work, f, impulses):
             f.limit[i] = f.coefficient[i] * p_n[i] / work.length[i] if work.length[i] > 0.0 else 0.0
             fastest = max(fastest, abs(change))
             if f.inertia[i] > 0.0:
-                fastest = max(fastest, _slide(f, i) / math.sqrt(f.inertia[i]))
+                fastest = max(fastest, _slide(f, i, d) / math.sqrt(f.inertia[i]))
         if fastest <= MET * speed:
             break
     if fastest > SWEPT * speed or dot_of(u, moved) + 0.5 * dot_of(moved, moved) > 0.0:
@@ -303,9 +299,9 @@ def _settle(count, rank, work, f, d, scale, pushes):
                 stride = 1.0 / max(1.0 - gain, 1.0 / STRIDE)
             f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.limit[i]
             f.limit[i] = max(0.0, f.limit[i] + step * stride * f.change[i])
-        moved = friction_sweeps(count, f, 1, 0.0, True)
+        moved = friction_sweeps(count, f, d, 1, 0.0)
         if moved > still:
-            friction_sweeps(count, f, SWEEPS - 1, SETTLED * moved, True)
+            friction_sweeps(count, f, d, SWEEPS - 1, SETTLED * moved)
         for i in range(count):  # an undamped limit that holds p_t would move it on
             own, change = f.p[i * size : (i + 1) * size], abs(f.change[i])
             length = math.sqrt(dot_of(own, own))
@@ -342,81 +338,57 @@ def _trim(count, rank, work, f, near):
 
 
 # Tangential impulses within Coulomb's discs: sweeps over the contacts; each contact stops or slides at its limit.
-# Here and in resting contact: `f` is a `FrictionWork` or a `RestWork`.
 
 # sin² of the angle between two tangents' rows; below it one row is a multiple of the other, up to rounding.
 SINGULAR = 1e-12
 
 
 @kernel
-def along_row(work, r, j, v):
-    """Return row j, of contact r, times v; each half of the row holds the entries of one of the contact's two trees."""
-    total, row, half = 0.0, work.rows[j], work.rows.shape[1] // 2
-    for side in range(2):
-        at = work.at[r, side]
-        for k in range(work.size[r, side]):
-            total += row[side * half + k] * v[at + k]
-    return total
-
-
-@kernel
-def add_along_row(work, r, j, factor, out):
-    """out += factor times row j, of contact r."""
-    row, half = work.rows[j], work.rows.shape[1] // 2
-    for side in range(2):
-        at = work.at[r, side]
-        for k in range(work.size[r, side]):
-            out[at + k] += factor * row[side * half + k]
-
-
-@kernel
-def set_inertia(f, i, width):
+def set_inertia(f, i, d):
     """Write the entries of B_i B_iᵀ, which has one or two rows, and its largest eigenvalue."""
     size = f.velocity.shape[0]
-    x, y = f.rows[i * size, :width], f.rows[i * size + size - 1, :width]
+    x, y = f.rows[i * size, :d], f.rows[i * size + size - 1, :d]
     xx, xy, yy = dot_of(x, x), dot_of(x, y), dot_of(y, y)
     f.block[i, 0], f.block[i, 1], f.block[i, 2] = xx, xy, yy
     f.inertia[i] = xx if size == 1 else 0.5 * (xx + yy) + hypotenuse(0.5 * (xx - yy), xy)
 
 
 @kernel
-def combine(count, f):
+def combine(count, f, d):
     """Write moved = Bᵀ p."""
-    size = f.velocity.shape[0]
-    f.moved[:] = 0.0
-    for i in range(count):
-        for j in range(i * size, (i + 1) * size):
-            add_along_row(f, i, j, f.p[j], f.moved)
+    moved = f.moved[:d]
+    moved[:] = 0.0
+    for j in range(count * f.velocity.shape[0]):
+        add_multiple(moved, f.p[j], f.rows[j])
 
 
 @kernel
-def friction_sweeps(count, f, sweeps, still, anew):
+def friction_sweeps(count, f, d, sweeps, still):
     """Sweep over the contacts: set p_i so that w_i = 0 if its disc allows this, else to proj(p_i − w_i / ρ_i).
 
     w = speed + B moved is the tangential velocity, moved = Bᵀ p, proj projects on the disc of radius limit_i. p and
-    moved change in place; `anew` combines moved in every sweep, so that rounding does not add up. Stops after a sweep
+    moved change in place; each sweep combines moved anew, so that rounding does not add up. Stops after a sweep
     that changes no velocity by more than `still`; returns the largest change of the last one [m/s].
     """
     fastest = 0.0
     for _ in range(sweeps):
-        if anew:
-            combine(count, f)
+        combine(count, f, d)
         fastest = 0.0
         for i in range(count):
             if f.inertia[i] > 0.0:
-                fastest = max(fastest, _slide(f, i))
+                fastest = max(fastest, _slide(f, i, d))
         if fastest <= still:
             break
     return fastest
 
 
 @kernel
-def _slide(f, i):
+def _slide(f, i, d):
     """Move one contact's impulse to stop its slip, or towards its limit; return the change of velocity [m/s]."""
-    velocity, size = f.velocity, f.velocity.shape[0]
+    velocity, size, moved = f.velocity, f.velocity.shape[0], f.moved[:d]
     first, limit, inertia = i * size, f.limit[i], f.inertia[i]
     for a in range(size):
-        velocity[a] = f.speed[first + a] + along_row(f, i, first + a, f.moved)
+        velocity[a] = f.speed[first + a] + dot_of(f.rows[first + a], moved)
     fastest = math.sqrt(dot_of(velocity, velocity))
     if not _stops(f, i, first):
         for a in range(size):
@@ -431,7 +403,7 @@ def _slide(f, i):
     for a in range(size):
         change = velocity[a] - f.p[first + a]
         f.p[first + a] += change
-        add_along_row(f, i, first + a, change, f.moved)
+        add_multiple(moved, change, f.rows[first + a])
     return fastest
 
 

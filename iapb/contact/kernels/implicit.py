@@ -19,13 +19,13 @@ Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K
 from __future__ import annotations
 
 import math
+from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import LEFT, TOUCHING, contact_before, group_of_contact
-from iapb.contact.kernels.impact_friction import add_along_row, along_row
 from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
-from iapb.contact.kernels.step_friction import trees_of_contact
 from iapb.linalg import add, add_multiple, dot_of, load, scale, store
+from iapb.schema import Floats, Integers
 
 STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
 EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies
@@ -36,6 +36,40 @@ FREE_TURNS = 3  # of these take the new limits whole; the others half, for limit
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
 SEARCHES = 40  # evaluations of a line search
 GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
+
+
+class RestWork(NamedTuple):
+    """Scratch of resting contact, implicit in the velocity, of one group (`rest_group`).
+
+    Each contact has a row for the normal and, with friction, for each tangent. Local coordinates number those of the
+    group. `width` is twice the number of coordinates of the largest tree.
+    """
+
+    contact: Annotated[Integers, "contact"]  # contacts of the group
+    at: Annotated[Integers, "contact 2"]  # first local coordinate of each of their two trees
+    size: Annotated[Integers, "contact 2"]  # number of coordinates of these; 0 = no tree, or the first one again
+    rows: Annotated[Floats, "row width"]  # rows of J: one half for each of the two trees
+    speed: Annotated[Floats, "row"]  # J v [m/s]
+    p: Annotated[Floats, "row"]  # impulses of the step [N s]
+    limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
+    bend: Annotated[Floats, "contact"]  # what the gap closed or opened more than Δt J v in the step before, by Δt [m/s]
+    first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
+    next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
+    next_tree: Annotated[Integers, "tree"]  # tree of the same group that follows, −1 = none
+    offset: Annotated[Integers, "tree"]  # first local coordinate of each tree
+    dof: Annotated[Integers, "velocity"]  # the coordinate v[dof] of each local one
+    begin: Annotated[Integers, "velocity"]  # first local coordinate of its tree
+    end: Annotated[Integers, "velocity"]  # and the one after the last
+    envelope: Annotated[Integers, "velocity"]  # first nonzero column of each row of the Newton matrix
+    change: Annotated[Floats, "row"]  # J Δv of a Newton step
+    v: Annotated[Floats, "velocity"]  # local velocities
+    free: Annotated[Floats, "velocity"]  # v*
+    balance: Annotated[Floats, "velocity"]  # M (v − v*) − Jᵀ p
+    change_of_v: Annotated[Floats, "velocity"]  # v − v*
+    step: Annotated[Floats, "velocity"]  # Newton step
+    given: Annotated[Floats, "velocity"]  # M times a vector, or L⁻¹ of one
+    energy: Annotated[Floats, "1"]  # ½ v*ᵀ M v* [J]
+    shortened: Annotated[Integers, "1"]  # solutions that were shortened, since the start
 
 
 @kernel(needs="implicit")
@@ -98,7 +132,7 @@ def gather_contacts(world, state, group, s):
     work, contacts, count, begin, i = state.rest_work, state.contacts, 0, 0, state.rest_work.first[group]
     while i >= 0:
         work.contact[count], work.limit[count], work.bend[count] = i, 0.0, 0.0
-        trees = trees_of_contact(world, contacts, i, work.offset, work.at[count], work.size[count])
+        trees = trees_of_contact(world, work, contacts, i, count)
         if trees[1] >= 0:
             high = work.offset[max(trees)]
             for k in range(high, work.end[high]):
@@ -116,6 +150,39 @@ def gather_contacts(world, state, group, s):
                 work.bend[count] = bend / world.dt
         count, i = count + 1, work.next[i]
     return count
+
+
+@kernel
+def trees_of_contact(world, work, contacts, i, r):
+    """Return the two trees of contact i, the second −1: none, or the same; write what row r needs of them to `work`."""
+    a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
+    trees = (a, -1 if b < 0 or world.tree_of_body[b] == a else world.tree_of_body[b])
+    for side in range(2):
+        t = trees[side]
+        work.at[r, side] = work.offset[t] if t >= 0 else 0
+        work.size[r, side] = world.tree_stop[t] - world.tree_start[t] if t >= 0 else 0
+    return trees
+
+
+@kernel
+def along_row(work, r, j, v):
+    """Return row j, of contact r, times v; each half of the row holds the entries of one of the contact's two trees."""
+    total, row, half = 0.0, work.rows[j], work.rows.shape[1] // 2
+    for side in range(2):
+        at = work.at[r, side]
+        for k in range(work.size[r, side]):
+            total += row[side * half + k] * v[at + k]
+    return total
+
+
+@kernel
+def add_along_row(work, r, j, factor, out):
+    """out += factor times row j, of contact r."""
+    row, half = work.rows[j], work.rows.shape[1] // 2
+    for side in range(2):
+        at = work.at[r, side]
+        for k in range(work.size[r, side]):
+            out[at + k] += factor * row[side * half + k]
 
 
 @kernel

@@ -42,7 +42,7 @@ def resting_force(world, state, contacts, i):
     x, n = load(contacts.point, i), load(contacts.normal, i)
     add_body_row(world.mechanism, state.body, contacts.body_a[i], x, n, force, state.stage_penalty)
     add_body_row(world.mechanism, state.body, contacts.body_b[i], x, n, -force, state.stage_penalty)
-    friction = 0.0 if world.coulomb else friction_of(world, contacts, i)
+    friction = friction_of(world, contacts, i)
     if friction == 0.0:
         return
     tangential = load(contacts.tangential_velocity, i)

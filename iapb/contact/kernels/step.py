@@ -17,13 +17,11 @@ from iapb.contact.kernels.resting import resting_force
 from iapb.contact.kernels.rows import contact_velocities
 from iapb.contact.kernels.seams import leave_out_seams
 from iapb.contact.kernels.shape_frames import copy_contact
-from iapb.contact.kernels.step_friction import add_step_friction
 from iapb.linalg import (
     add,
     add_multiple,
     cholesky,
     cholesky_tree_blocks,
-    load,
     scale,
     solve_mass,
     solve_tree_blocks,
@@ -108,7 +106,6 @@ def find_contacts(world, state):
     for i in range(state.contact_count[0]):  # `mark_new` and friction compare with those of the last step
         copy_contact(before, i, now, i)
         before.normal_force[i], before.expected[i] = now.normal_force[i], now.expected[i]
-        store(before.friction_force, i, load(now.friction_force, i))
     state.contact_count[1] = state.contact_count[0]
     count = present_contacts(world, state, now)
     if count < 0:
@@ -165,7 +162,7 @@ def move(world, state, applied):
             state.friction_force[k] += weight * state.stage_friction[k]
     for k in range(state.v.shape[0]):
         state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
-    touches = world.switches.contacts and (world.coulomb or world.implicit)
+    touches = world.switches.contacts and world.implicit
     if (touches or world.switches.joint_damping) and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
     finite = True
@@ -190,12 +187,10 @@ def implicit_forces(world, state, touches):
             return False
     if damped and not damp_joints(world, state):
         return False
-    if touches and world.implicit:
-        rest_implicitly(world, state, world.coulomb)
+    if touches:
+        rest_implicitly(world, state, world.switches.friction)
         for k in range(state.v.shape[0] if damped else 0):
             state.acceleration[k] = -world.joint_damping[k] * state.v[k]
-    elif touches:
-        add_step_friction(world, state)
     if damped:
         add_multiple(state.friction_force, 1.0, state.acceleration)
     return True

@@ -10,7 +10,7 @@ from iapb.contact.geometry import ContactBuffer, Shapes
 from iapb.contact.kernels.broadphase import BroadPhase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
-from iapb.contact.kernels.step_friction import RestWork
+from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.free_motion import FreeMotion
@@ -27,6 +27,7 @@ class Switches(NamedTuple):
     unequal_restitution: bool
     pushing: bool
     impact_friction: bool
+    friction: bool  # of resting contacts
     clustering: bool
     supports: bool  # a contact that strikes may have others beside it, which carry a load or have another e
     impulse_limit: bool
@@ -70,7 +71,6 @@ class World(NamedTuple):
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
     friction_class: np.ndarray  # (shapes + stops,) int64
     friction: np.ndarray  # (classes, classes) μ (6) of two shapes by their classes
-    coulomb: bool  # resting friction by Coulomb's law, implicit in the step; False: the paper's explicit (6)
     friction_velocity: float  # v_threshold [m/s] (6)
     restitution: float  # e of all contacts whose shapes give no e of their own
     own_restitution: np.ndarray  # (shapes + stops,) e that a shape's body or wall gives, above 1 = none

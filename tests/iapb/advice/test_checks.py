@@ -38,9 +38,10 @@ def stack(n: int, **values: Any) -> Scene:
     return scene(*(box(i, SIDE * i) for i in range(n)), **values)
 
 
-# Regularised friction, sliding and rocking together: tᵀ(J M⁻¹ Jᵀ)t of two corners with N/2 each is (1/m + h²/I) N.
+# Friction (6), sliding and rocking together: tᵀ(J M⁻¹ Jᵀ)t of two corners with N/2 each is (1/m + h²/I) N.
 SLOWEST = 0.5 * 0.5 * 9.81 * 2.5 * 1e-3
-LANDING = scene(box(height=0.1, velocity=[1.0, 0.0, 0.0]), duration=0.4, stiffness=1e4, friction=0.5, restitution=0.5)
+LANDING = scene(box(height=0.1, velocity=[1.0, 0.0, 0.0]), duration=0.4, stiffness=1e4, friction=0.5, restitution=0.5,
+                friction_velocity=2e-2)
 BALL = SpatialScene.model_validate({
     "name": "made", "dimensions": 3, "rate": 1000, "duration": 0.2, "integrator": "midpoint", "bodies": [
         {"name": "ball", "joint": "free_flyer", "mass": 0.5, "inertia": [1e-3] * 3, "position": [0, 0, 1, 0, 0, 0, 1],
@@ -58,9 +59,9 @@ WARNED: dict[str, tuple[Scene, list[str], list[str], list[dict[str, Any]]]] = {
             [{"contact.stiffness": 2500.0}]),
     "sag of a joint": (scene(DOOR, stiffness=100.0), ["sag"], ["by 0.49", ">= 500", "lower limit of door"],
                        [{"contact.stiffness": 500.0}, {"bodies.door.joint_limits": [-1.0, 1.0]}]),
-    "friction (6)": (scene(box(), stiffness=1e4, friction=0.5, friction_law="regularised"), ["friction"],
+    "friction (6)": (scene(box(), stiffness=1e4, friction=0.5), ["friction"],
                      [f">= {math.ceil(1e4 * SLOWEST) / 1e4:g}"],
-                     [{"contact.friction_velocity": 1.01 * SLOWEST}, {"contact.friction_law": "coulomb"}]),
+                     [{"contact.friction_velocity": 1.01 * SLOWEST}, {"contact.forces": "implicit"}]),
     "behind": (scene(box(height=-5.0), stiffness=1e4), ["outside"], ["[0, 5] m"],
                [{"bodies.box_0.position": [0, 0.05, 0]}]),
     "inside": (scene(box(height=-0.03), stiffness=1e4), ["overlap"], ["[0, 0.03] m", "9 J"],

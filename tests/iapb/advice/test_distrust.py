@@ -204,7 +204,8 @@ def test_what_falls_through_a_gap_too_narrow_for_it_is_seen(
              for name, side in (("left", -1.0), ("right", 1.0))]
     thing = body("thing", shape, [0, 0], [], mass=1.0) | {"inertia": SIDE**2 / 6.0}
     run = run_of(thing, walls=walls, steps=500, gravity=[0, -9.81],
-                 contact={"forces": "paper", "stiffness": 1e4, "damping": 50.0, "friction": friction})
+                 contact={"forces": "paper", "stiffness": 1e4, "damping": 50.0, "friction": friction,
+                           "friction_velocity": 0.3})
     assert (run.q[-1, 1] < -SIDE) == (friction == 0.0)
     assert [why for why in run.distrust if "narrower" in why and said not in why] == []
     assert any("narrower" in why for why in run.distrust) == bool(said)

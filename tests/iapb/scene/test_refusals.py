@@ -98,7 +98,6 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "contact.friction_pairs": [1, [1], [PAIR | {"between": ["arm", "nobody"]}], [PAIR | {"between": ["arm"]}],
                                [PAIR | {"friction": -1}], [PAIR, PAIR | {"between": ["puck", "arm"]}],
                                [PAIR | {"between": ["arm", "arm"]}]],
-    "contact.friction_law": ["dry", "Coulomb", None, True],
     "contact.restitution": [*NEGATIVE, 1.001],
     "contact.self_collision_rows": ["both", None],
     "hand.body": [*NOT_A_NAME, "nobody", "floor", "foot"],
