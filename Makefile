@@ -108,7 +108,7 @@ lock: ## resolve requirements.lock again from pyproject.toml (needs uv)
 
 .PHONY: clean
 clean: ## remove what runs, tests and builds left (keeps .venv)
-	@rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis *.egg-info
+	@rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis *.egg-info verification/proofs/coq/{build,checked.json}
 	@find iapb reference verification reports tests -name __pycache__ -prune -exec rm -rf {} +
 
 .PHONY: distclean

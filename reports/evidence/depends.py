@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 
 from reports.provenance import package_version
-from verification.proofs import coq_development, layout
+from verification.proofs import layout
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared"  # optional external files
 ABSENT = "absent"
@@ -35,9 +35,8 @@ def depends_of(stage: str) -> dict[str, str]:
     """
     stage = stage.partition(",")[0]
     folders = {name: folder_hash(BESIDE / name) for name in FOLDERS.get(stage, ())}
-    if stage in ("proofs", "Coq development"):
-        folders |= {"Coq": coq_development.version(), "coq": folder_hash(coq_development.FOLDER),
-                    "statements": folder_hash(layout.FOLDER)}
+    if stage == "proofs":
+        folders["statements"] = folder_hash(layout.FOLDER)
     return folders | {name: package_version(name) for name in PACKAGES.get(stage, ())}
 
 

@@ -39,6 +39,7 @@ from verification.finding import Failure, Finding, attempt
 from verification.hard_cases import judge
 from verification.hard_cases.findings import on_hard_cases
 from verification.proofs import on_proofs
+from verification.proofs.coq import checked
 
 Progress = Callable[[str, int, int], None]
 
@@ -57,7 +58,7 @@ CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
 # The first stages to be computed: one worker compiles the engine for the figures' runs, while the other needs no engine
 # for proofs and the slowest runs. The stages after them are shorter.
 ON_THE_PEG = "claims on the peg"
-FIRST = ("Coq development", "proofs", ON_THE_PEG, "properties", "claims")
+FIRST = ("proofs", ON_THE_PEG, "properties", "claims")
 COMPILED_AHEAD = (C19, C22, ACCURACY, RACES, SCALING, BODIES, IMPACT_TIMES)  # checks whose kernels only they call
 PAUSE = 0.2  # [s] between two looks at what the workers say
 
@@ -87,7 +88,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     ledger = tuple(sorted((claim for name in CLAIM_STAGES for claim in stages[name].records or ()),
                           key=lambda claim: claim.key))  # fmt: skip
     gains, properties, *others = (stages[name].records or _failed(stages[name]) for name in TOPICS)
-    topics = [gains, finding("proofs", partial(on_proofs, development=stages["Coq development"].records or ())),
+    topics = [gains, finding("proofs", partial(on_proofs, development=checked.read())),
               properties, finding("hard cases", on_hard_cases), *others]  # fmt: skip
     topics = [haptic_rate.quoting(topic, (*ledger, *topics)) if topic.key == haptic_rate.TOPIC.key else topic
               for topic in topics]  # fmt: skip

@@ -18,7 +18,6 @@ from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_o
 from verification.hard_cases.findings import hard_cases
 from verification.laws.topic import counterexamples
 from verification.proofs import check_all
-from verification.proofs.coq_development import Theorem, theorems
 from verification.proofs.show import ProofRecord
 from verification.table import Table
 
@@ -112,7 +111,6 @@ def plans() -> dict[str, Plan]:
         **{stage: Plan(tuple[Finding, ...], partial(checked_claims, stage), stage == "claims on times")
            for stage in CLAIM_STAGES},
         "proofs": Plan(tuple[ProofRecord, ...], lambda *given: check_all(*given[2:])),
-        "Coq development": Plan(tuple[Theorem, ...], lambda *given: theorems(*given[2:])),
         "counterexamples": Plan(tuple[Finding, ...], lambda *given: counterexamples(*given[2:])),
         "hard cases": Plan(tuple[Finding, ...], lambda runner, _, *given: hard_cases(runner, *given), timed=True),
         "accuracy": Plan(Table, lambda runner, depth, progress, failures: work_precision(

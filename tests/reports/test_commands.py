@@ -21,7 +21,6 @@ from reports import cli, show
 from reports.store.runs import read_run
 from verification.cost.accuracy import Choice
 from verification.finding import REPRODUCED, Failure, Finding, Part, with_failures
-from verification.proofs.coq_development import Theorem
 from verification.table import Column, Table, titled
 
 ROOT = Path(__file__).parents[2]
@@ -330,9 +329,7 @@ def standing_still(mass_matrix, contact_jacobian, velocity, restitution):
     return 0.0 * velocity
 
 
-def test_verify_judges_the_counterexample_of_a_resolver_again_and_prove_says_what_coq_refuses(
-    answer, tmp_path, monkeypatch
-):
+def test_verify_judges_the_counterexample_of_a_resolver_again(answer, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     again = ("verify", "--full", "--impacts", 20, "--trajectories", 0, "--out", tmp_path)
     status, found = answer(*again, "--resolver", "tests.reports.test_commands:standing_still")
@@ -340,12 +337,6 @@ def test_verify_judges_the_counterexample_of_a_resolver_again_and_prove_says_wha
     assert {one["law"]: one["failures"] > 0 for one in found["laws"]["impacts"]}["restitution"]
     status, found = answer("verify", "--recheck", found["counterexamples"][0], "--allow-code")
     assert status == 1 and not found["passed"] and not found["laws"][0]["passed"]
-    refused = Theorem("sign_kept", "yes", ("an_axiom_of_its_own",))
-    monkeypatch.setattr("reports.commands.prove.theorems", lambda: (refused,))
-    monkeypatch.setattr("reports.commands.prove.all_proofs", lambda: ())
-    status, found = answer("prove", "--second-tool")
-    assert status == 1 and found["theorems"][0]["verdict"] == "refused"
-    assert found["theorems"][0]["axioms"] == ["an_axiom_of_its_own"]
 
 
 def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, monkeypatch):

@@ -71,8 +71,7 @@ class ProofRecord:
     measured: tuple[str, ...]
     problems: tuple[str, ...]
     seconds: float = field(compare=False)
-    sympy: str = NOT_APPLICABLE  # whether SymPy and Coq accept the proof too: YES, NO, or why there is no answer
-    coq: str = NOT_APPLICABLE
+    sympy: str = NOT_APPLICABLE  # whether SymPy accepts the proof too: YES, NO, or why there is no answer
 
     @property
     def holds(self) -> bool:
