@@ -1,12 +1,10 @@
-"""Read contact problems of other projects: LCP text files (plain or gzip), MLCP text, FCLIB HDF5; write FCLIB.
+"""Read contact problems of other projects: LCP text files (plain or gzip) and FCLIB HDF5 files.
 
 `read_problem(path)` chooses the format by the ending of the file's name:
 
 - .lcp, .lcp.gz (lcpy): n, M (n x n, row by row) and q of the LCP  0 <= z ⟂ M z + q >= 0.
 - .dat (Siconos): size, storage flag 0, four sizes, then M **column by column** and q. Only by columns does
   `lcp_Pang_isolated_sol` have a solution, and `lcp_CPS_2` equal example 4.4.7 of Cottle, Pang, Stone (1992).
-- .txt (OpenSurgSim): a labelled MLCP with constraint types, E, HCHt, friction and stored lambda; bilateral constraints
-  of one to three dimensions and frictionless unilateral ones are read.
 - .hdf5, .h5: the FrictionalContactLibrary (normal component first). fclib_local : u = W r + q;
   fclib_global : M v = H r + f, u = Hᵀ v + w. Both have friction mu per contact and a solution (r, u, v). A solution of
   zeros counts as absent, because unsolved files have one. A global problem is condensed with sparse factors:
@@ -40,12 +38,6 @@ _LARGEST_TEXT = 64 << 20  # unpacked bytes, enough for 2,500 unknowns; a small g
 _BLOCK = 256  # columns of M⁻¹ H at a time: 25 MB for 12,000 coordinates
 _COLUMNS, _ROWS = -1, -2  # nz of compressed columns and compressed rows; nz >= 0 counts triplets
 
-# Rows of each constraint type of an MLCP file: True for a two-sided row.
-_MLCP_ROWS = {
-    **{f"MLCP_BILATERAL_{n}D_CONSTRAINT": (True,) * n for n in (1, 2, 3)},
-    "MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT": (False,),
-}
-
 
 class DatasetError(IapbError, ValueError):
     """A problem file is damaged or has an unknown format."""
@@ -64,7 +56,7 @@ class StoredProblem:
 
 
 def read_problem(path: Path | str, budget: int | None = None) -> StoredProblem:
-    """Read a problem file of any known format: .lcp.gz or .lcp, .dat, .txt (MLCP), .hdf5 or .h5 (FCLIB).
+    """Read a problem file of any known format: .lcp.gz or .lcp, .dat, .hdf5 or .h5 (FCLIB).
 
     Parameters
     ----------
@@ -131,27 +123,6 @@ def _siconos_lcp(path: Path) -> StoredProblem:
         raise ValueError(f"storage flag {flag}, sizes {sizes}: expected flag 0 (dense) and four times {n}")
     matrix, q = _square(n, numbers)
     return StoredProblem(ImpactProblem.from_delassus(matrix.T, q, name=path.name))
-
-
-def _mlcp(path: Path) -> StoredProblem:
-    fields: dict[str, str] = {}  # of 'label = value' entries, whose bracketed values may span lines
-    label, (text, mark, _) = "", _text(path).partition("\n==")
-    if not mark:
-        raise ValueError("has no end mark '== END ==': cut off, or not an MLCP file")
-    for line in text.splitlines():
-        if line.startswith("#"):
-            continue
-        if " =" in line and not line.startswith(" "):
-            label, _, value = (part.strip() for part in line.partition("="))
-            fields[label] = value
-        elif label:
-            fields[label] += " " + line.strip()
-    bilateral = np.array([two_sided for kind in fields["constraint types"].split() for two_sided in _MLCP_ROWS[kind]])
-    words = {key: fields[key].replace("(", " ").replace(")", " ").split() for key in ("E", "lambda", "HCHt")}
-    w, q = _square(str(len(words["E"])), words["HCHt"] + words["E"])
-    joints = bilateral if bilateral.any() or len(bilateral) != len(q) else None
-    problem = ImpactProblem.from_delassus(w, q, bilateral=joints, name=path.name)
-    return StoredProblem(problem, np.array(words["lambda"], np.float64))
 
 
 def _fclib(path: Path, allowed: int | None) -> StoredProblem:
@@ -222,39 +193,4 @@ def _matrix(budget: Budget, group: Any, most: int) -> Any:
     return sparse.coo_matrix((x[:nz], (i[:nz], p[:nz])), shape=(m, n)).tocsc()
 
 
-_READERS = {".lcp": _lcp, ".lcp.gz": _lcp, ".dat": _siconos_lcp, ".txt": _mlcp, ".hdf5": _fclib, ".h5": _fclib}
-
-
-def write_fclib(path: Path | str, problem: ImpactProblem, title: str = "", impulse: Floats | None = None) -> None:
-    """Write a problem (and its solution) as fclib_local; W is stored as compressed rows.
-
-    A frictionless problem is written with two zero tangential components per contact and mu = 0. Restitution is
-    included in q, because FCLIB has no e; reading the file gives the same complementarity problem with e = 0.
-    """
-    if problem.relaxed:
-        raise ArgumentError("problem", problem.name, "Coulomb's law: FCLIB has no mark for the relaxed one")
-    w, q, r, size = problem.delassus, problem.offset, impulse, problem.contact_size
-    if size == 1:
-        size, normals = 3, np.arange(0, 3 * problem.size, 3)
-        w, q = np.zeros((3 * problem.size,) * 2), np.zeros(3 * problem.size)
-        w[np.ix_(normals, normals)], q[normals] = problem.delassus, problem.offset
-        if impulse is not None:
-            r = np.zeros(3 * problem.size)
-            r[normals] = impulse
-    with needed("h5py", "FCLIB files").File(path, "w") as file:
-        group = file.create_group("fclib_local")
-        _write_rows(group.create_group("W"), w)
-        group["vectors/q"], group["vectors/mu"] = q, problem.friction_or_zero
-        group["spacedim"] = np.array([size], np.int32)
-        group["info/title"] = np.bytes_(title or problem.name or "iapb")
-        if r is not None:
-            file["solution/r"], file["solution/u"] = r, w @ r + q
-
-
-def _write_rows(group: Any, matrix: Floats) -> None:
-    from scipy import sparse
-
-    rows = sparse.csr_matrix(matrix)
-    for name, number in (("m", rows.shape[0]), ("n", rows.shape[1]), ("nz", _ROWS), ("nzmax", rows.nnz)):
-        group[name] = np.array([number], np.int32)
-    group["i"], group["p"], group["x"] = rows.indices.astype(np.int32), rows.indptr.astype(np.int32), rows.data
+_READERS = {".lcp": _lcp, ".lcp.gz": _lcp, ".dat": _siconos_lcp, ".hdf5": _fclib, ".h5": _fclib}

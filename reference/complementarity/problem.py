@@ -3,8 +3,6 @@
 Frictionless, by Newton's law:  0 <= p ⟂ gamma_plus + E gamma_minus >= 0,  gamma_plus = gamma_minus + W p.
 With friction mu and blocks (normal, tangent...):  K ∋ p ⟂ u + mu |u_T| n ∈ K*  (Coulomb's law, an NCP),
 where u is gamma_plus with E gamma_minus added to its normals. `relaxed` drops the shift mu |u_T|: the CCP.
-A joint is a block with gamma_plus = 0 in all components and p of either sign; the problem is then mixed (MLCP). If a
-joint has fewer components than a block, the other rows are zero.
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError, SolverError
 from reference import Floats
@@ -34,7 +32,7 @@ class ImpactProblem:
 
     delassus: Floats  #: (n, n) W = J M⁻¹ Jᵀ [1/kg]
     gamma_minus: Floats  #: (n,) contact velocities J v⁻ before the impact [m/s]; normals > 0 separate
-    restitution: Floats  #: (k,) Newton's e of each contact, in [0, 1]; it is ignored for joints
+    restitution: Floats  #: (k,) Newton's e of each contact, in [0, 1]
     friction: Floats | None = None  #: (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
     contact_size: int = 1  #: components per contact, normal first: 1, 2 (planar friction) or 3
     relaxed: bool = False  #: True drops the shift mu |u_T| from Coulomb's law (convex relaxation)
@@ -42,37 +40,31 @@ class ImpactProblem:
     mass_matrix: Floats | None = None  #: the mechanics (d, d), (n, d), (d,), if known
     contact_jacobian: Floats | None = None
     velocity: Floats | None = None
-    bilateral: NDArray[np.bool_] | None = None  #: (k,) True for blocks of joints
 
     @classmethod
     def from_impact(
         cls, mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: ArrayLike,
         friction: ArrayLike | None = None, *, contact_size: int | None = None, relaxed: bool = False,
-        bilateral: ArrayLike | None = None, name: str = "",
+        name: str = "",
     ) -> ImpactProblem:
         """Return the problem of an impact of velocity v (d,) on rows J (n, d) with mass matrix M (d, d)."""
         v = _array("velocity", velocity, (None,))
         mass = _array("mass_matrix", mass_matrix, (len(v), len(v)))
         jacobian = _array("contact_jacobian", contact_jacobian, (None, len(v)))
         factor = _mechanical_factor(mass, jacobian)
-        contacts = _contacts(len(jacobian), contact_size, restitution, friction, relaxed, bilateral, name)
+        contacts = _contacts(len(jacobian), contact_size, restitution, friction, relaxed, name)
         return cls(factor @ factor.T, jacobian @ v, **contacts, mass_matrix=mass, contact_jacobian=jacobian, velocity=v)
 
     @classmethod
     def from_delassus(
         cls, delassus: ArrayLike, gamma_minus: ArrayLike, restitution: ArrayLike = 0.0,
         friction: ArrayLike | None = None, *, contact_size: int | None = None, relaxed: bool = False,
-        bilateral: ArrayLike | None = None, name: str = "",
+        name: str = "",
     ) -> ImpactProblem:
         """Return the problem of W (n, n) and gamma_minus (n,); with e = 0 it is the LCP (W, gamma_minus)."""
         gamma = _array("gamma_minus", gamma_minus, (None,))
         w = _array("delassus", delassus, (len(gamma), len(gamma)))
-        return cls(w, gamma, **_contacts(len(gamma), contact_size, restitution, friction, relaxed, bilateral, name))
-
-    @property
-    def two_sided(self) -> NDArray[np.bool_]:
-        """`bilateral` (k,), or all False if it is None."""
-        return np.zeros(self.contacts, np.bool_) if self.bilateral is None else self.bilateral
+        return cls(w, gamma, **_contacts(len(gamma), contact_size, restitution, friction, relaxed, name))
 
     @property
     def size(self) -> int:
@@ -93,7 +85,7 @@ class ImpactProblem:
     def offset(self) -> Floats:
         """The constant b (n,) of w = W p + b: gamma_minus with e gamma_minus added to contacts' normals [m/s]."""
         b = self.gamma_minus.copy()
-        b[:: self.contact_size] *= 1.0 + np.where(self.two_sided, 0.0, self.restitution)
+        b[:: self.contact_size] *= 1.0 + self.restitution
         return b
 
     @cached_property
@@ -148,7 +140,7 @@ def _array(argument: str, value: Any, shape: tuple[int | None, ...]) -> Floats:
 
 def _contacts(
     rows: int, contact_size: int | None, restitution: ArrayLike, friction: ArrayLike | None, relaxed: bool,
-    bilateral: ArrayLike | None, name: str,
+    name: str,
 ) -> dict[str, Any]:
     """Return the fields of an ImpactProblem that describe its contacts, each coefficient as an array (k,)."""
     size = contact_size or (1 if friction is None else 3)
@@ -163,10 +155,6 @@ def _contacts(
             if not ((array >= 0.0) & (array <= upper) & np.isfinite(array)).all():
                 raise ArgumentError(argument, value, "values in [0, 1]" if upper == 1.0 else "finite values >= 0")
             found[argument] = np.ascontiguousarray(np.broadcast_to(array, rows // size))
-    if bilateral is not None:
-        found["bilateral"] = np.array(bilateral, dtype=np.bool_)
-        if found["bilateral"].shape != (rows // size,):
-            raise ArgumentError("bilateral", bilateral, f"shape ({rows // size},)")
     return found
 
 

@@ -95,17 +95,16 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
     mu, size, scale = problem.friction_or_zero, problem.contact_size, velocity_scale(problem)
     w = problem.contact_velocity(impulse).reshape(-1, size) / scale
     if problem.friction is not None and not problem.relaxed:
-        w = de_saxce_shift(w, np.where(problem.two_sided, 0.0, mu))
+        w = de_saxce_shift(w, mu)
     # per contact the largest |W| entry of its rows [1/kg] converts an impulse into a velocity
     largest = np.abs(problem.delassus).max(axis=1).reshape(-1, size).max(axis=1)
     p = np.where(largest > 0.0, largest, 1.0)[:, None] * impulse.reshape(-1, size) / scale
-    joints = problem.two_sided  # cone: the whole line, dual cone: zero
-    natural = np.where(joints[:, None], w, p - project_on_cone(p - w, mu))
+    natural = p - project_on_cone(p - w, mu)
     product = np.abs(np.einsum("ij,ij->i", p, w)) / np.maximum(1.0, np.linalg.norm(p, axis=1))
     # the distance from the dual cone is |proj_K(-w)| by Moreau's decomposition
-    outside, penetrating = p - project_on_cone(p, mu), np.where(joints[:, None], w, project_on_cone(-w, mu))
+    outside, penetrating = p - project_on_cone(p, mu), project_on_cone(-w, mu)
     return Residuals(
-        float(np.where(joints, 0.0, np.linalg.norm(outside, axis=1)).max()),
+        float(np.linalg.norm(outside, axis=1).max()),
         float(np.linalg.norm(penetrating, axis=1).max()), float(product.max()), float(np.abs(natural).max()),
     )  # fmt: skip
 

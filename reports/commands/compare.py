@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,7 @@ import typer
 
 from iapb.errors import ArgumentError, MissingDependencyError
 from iapb.lazy import needed
-from reference.datasets import problem_files, write_fclib
+from reference.datasets import problem_files
 from reference.worlds import run_world
 from reports.commands.run import Values, scene_given
 from reports.figures.figure import draw, standalone
@@ -20,7 +19,7 @@ from reports.figures.worlds import worlds as worlds_figure
 from reports.show import Answer, Json, sentence, stage_progress
 from reports.store.io import write_whole
 from verification.check import Topic
-from verification.complementarity.solvers import collections, own_problems
+from verification.complementarity.solvers import collections
 from verification.complementarity.topic import complementarity
 from verification.finding import Finding
 from verification.table import Table, titled
@@ -42,12 +41,10 @@ def compare(
     set_: Values = None,
     impacts: Annotated[int, typer.Option(min=0, help="Largest number of impacts of SCENE given to every solver.")] = 12,
     problems: Annotated[list[Path] | None, typer.Option(
-        help="A folder of problem files (LCP, MLCP, FCLIB) for every solver. Repeatable.")] = None,
+        help="A folder of problem files (LCP, FCLIB) for every solver. Repeatable.")] = None,
     only_problems: Annotated[bool, typer.Option(
         "--only-problems", help="Only the problem files, not the comparison on impacts.")] = False,
     full: Annotated[bool, typer.Option("--full", help="Ten times the impacts, more repeats.")] = False,
-    export: Annotated[Path | None, typer.Option(
-        help="Write iapb's own problems to this folder as FCLIB files, and stop.")] = None,
     out: Annotated[Path | None, typer.Option(
         help="File of the results, .json; default: in out/compare. The figure stands beside it.")] = None,
     json_: Json = False,
@@ -62,14 +59,8 @@ def compare(
             raise typer.BadParameter("give a SCENE", param_hint=option)
     for folder in problems or ():
         if not problem_files(folder):
-            kinds = ".lcp, .lcp.gz, .dat, .txt, .hdf5, .h5"
+            kinds = ".lcp, .lcp.gz, .dat, .hdf5, .h5"
             raise ArgumentError("--problems", str(folder), f"a folder with problem files ({kinds})")
-    if export is not None:
-        export.mkdir(parents=True, exist_ok=True)
-        with stage_progress() as progress:
-            progress("our own problems", 0, 1)
-            count = _export(export)
-        return Answer({"problems": count, "folder": export}, [f"{count} problems written to {export}"])
     folders = {str(folder): folder for folder in problems or ()}
     with stage_progress() as progress:
         if scene is not None:
@@ -98,15 +89,6 @@ def compare(
     answer = Answer(_facts(found), [*lines, f"Stored in {place}"], 1 if found.failures else 0)
     write_whole(place, answer.text(json_=True))
     return answer
-
-
-def _export(folder: Path) -> int:
-    """Write the built-in problems of the study, one file each."""
-    problems = [stored.problem for stored in own_problems()]
-    for problem in problems:
-        title = problem.name.replace("μ", "mu")  # FCLIB's titles are ASCII
-        write_fclib(folder / f"{re.sub(r'[^a-z0-9.]+', '_', title.lower())}.hdf5", problem, title)
-    return len(problems)
 
 
 def _facts(found: Finding) -> dict[str, Any]:

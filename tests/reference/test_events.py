@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,6 @@ from reference.event_driven import LinearSystem, event_driven
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
 from tests.reference.scenes import G, scene_of
-
-PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
 
 
 def ball(e: float, mass: float = 1.0) -> LinearSystem:

@@ -10,11 +10,10 @@ import h5py
 import numpy as np
 
 from iapb import find_scene, load_scene
-from reference.complementarity.problem import ImpactProblem
-from reference.datasets import _write_rows, write_fclib
 from reference.worlds import run_world
 from reports.store import RunStore
 from reports.store.tables import write_table
+from tests.reference.fclib_files import local_file, matrix_group
 from verification.table import titled
 
 TIMES = int(os.environ.get("IAPB_FUZZ", "1"))  # how often each fault is done, and a multiple of the wrong inputs
@@ -54,14 +53,14 @@ def result_files():
 def fclib_files():
     """A local and a global problem with friction."""
     rng = np.random.default_rng(0)
-    problem = ImpactProblem.from_impact(np.eye(6), rng.normal(size=(6, 6)), rng.normal(size=6), 0.0, [0.3, 0.5])
+    rows = rng.normal(size=(6, 6))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "local.hdf5"
-        write_fclib(path, problem, "sample", np.ones(6))
+        local_file(path, rows @ rows.T, rng.normal(size=6), [0.3, 0.5], np.ones(6))
         with h5py.File(path.with_name("global.hdf5"), "w") as file:
             group = file.create_group("fclib_global")
-            _write_rows(group.create_group("M"), np.eye(6))
-            _write_rows(group.create_group("H"), rng.normal(size=(6, 3)))
+            matrix_group(group.create_group("M"), np.eye(6))
+            matrix_group(group.create_group("H"), rng.normal(size=(6, 3)))
             group["vectors/f"], group["vectors/w"], group["vectors/mu"] = np.ones(6), np.zeros(3), np.array([0.3])
             group["spacedim"], group["info/title"] = np.array([3], np.int32), np.bytes_("sample")
         return {each.name: each.read_bytes() for each in sorted(path.parent.iterdir())}

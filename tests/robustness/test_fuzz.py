@@ -223,17 +223,7 @@ def read_results(path):
 
 LCP = b"2\n2 1\n1 2\n-5 -6\n"
 PROBLEMS = {"two.lcp": LCP, "two.lcp.gz": gzip.compress(LCP, mtime=0),
-            "fathi.dat": b"3\n0\n3\n3\n3\n3\n1 0 0\n2 1 0\n2 2 1\n-8 -6 -4\nexample of Fathi\n", "contacts.txt": b"""\
-# two contacts
-numDof = 6
-constraint types = MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT MLCP_UNILATERAL_3D_FRICTIONLESS_CONSTRAINT
-E = ((-1) (-2))
-HCHt = ((2 1)
-        (1 2))
-mu = (0 0)
-lambda = ((0) (1))
-== END ==
-"""}  # fmt: skip
+            "fathi.dat": b"3\n0\n3\n3\n3\n3\n1 0 0\n2 1 0\n2 2 1\n-8 -6 -4\nexample of Fathi\n"}  # fmt: skip
 LINES = (
     "run peg_corner --set duration=0.05",
     "run two_discs --world PB --set duration=0.05 --set contact.restitution=0.5",
@@ -267,7 +257,7 @@ KINDS = {  # samples, damage, reader, and how many cases are tried: fewer where 
     "scenes": (lambda: shipped("*.yaml"), damaged_values, read_scene, 300),
     "URDF robots": (lambda: shipped("robots/*.urdf"), damaged_text, read_robot, 200),
     "sweep studies": (lambda: shipped("sweeps/*.yaml"), damaged_values, read_study, 200),
-    "LCP and MLCP files": (lambda: PROBLEMS, damaged_text, read_problem, 200),
+    "LCP files": (lambda: PROBLEMS, damaged_text, read_problem, 200),
     "FCLIB files": (fclib_files, damaged_hdf5, read_problem, 60),
     "run files and tables": (result_files, damaged_bytes, read_results, 200),
     "sealed run files": (result_files, lambda *given: sealed(damaged_hdf5(*given)), read_results, 60),

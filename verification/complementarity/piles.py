@@ -71,7 +71,7 @@ def recorded_piles(folder: Path | str, largest: int) -> Iterator[ImpactCase]:
             stored = read_problem(path).problem
             step = stored.contact_size
             problem = ImpactProblem.from_delassus(stored.delassus[::step, ::step], stored.offset[::step])
-            if LEAST_RECORDED <= problem.size <= largest and not stored.two_sided.any():
+            if LEAST_RECORDED <= problem.size <= largest:
                 velocity = np.linalg.lstsq(problem.factor, problem.offset)[0]
                 yield ImpactCase(np.eye(problem.size), problem.factor, velocity, 0.0, f"recorded: {path.name}")
         except (DatasetError, SolverError):  # the study of problem files lists these files

@@ -166,7 +166,7 @@ FRICTIONAL_CONTACTS = (1, 4, 12)
 _SEED = 9
 
 
-def own_problems(failures: list[Failure] | None = None) -> tuple[StoredProblem, ...]:
+def own_problems(failures: list[Failure] | None) -> tuple[StoredProblem, ...]:
     """Return all problems of our own, frictionless ones first; `failures` receives those that cannot be made."""
     makers: dict[str, Callable[[], tuple[Any, ...]]] = {f"hard case {name}": partial(_hard, name) for name in HARD}
     makers |= {f"impact of {name}": partial(_widest, name) for name in SCENES}

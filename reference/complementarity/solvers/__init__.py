@@ -30,7 +30,6 @@ class SolverEntry:
     package: str
     method: str
     takes: str  #: "lcp" = any frictionless problem, "convex" = only symmetric semidefinite W, "cone" = friction
-    bilateral: bool = False  #: accepts two-sided rows as well
     option: str = ""  #: argument of the module's solve if it serves several solvers
 
 
@@ -38,20 +37,17 @@ _HERE = "reference.complementarity.solvers"
 _PINOCCHIO = f"{_HERE}.pinocchio_contact"
 
 SOLVERS: dict[str, SolverEntry] = {
-    "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp", True),
+    "enumeration": SolverEntry(f"{_HERE}.enumeration", "scipy", "all active sets, small n", "lcp"),
     "lemke": SolverEntry(f"{_HERE}.lemke", "quantecon", "complementary pivoting (Lemke)", "lcp"),
-    "gauss_seidel": SolverEntry(f"{_HERE}.sweeps", "numba", "projected Gauss-Seidel", "lcp", True),
-    "daqp": SolverEntry(f"{_HERE}.qp", "daqp", "dual active set", "convex", True, "daqp"),
-    "quadprog": SolverEntry(f"{_HERE}.qp", "qpsolvers quadprog", "Goldfarb-Idnani active set", "convex", False,
-                            "quadprog"),
-    "proxqp": SolverEntry(f"{_HERE}.qp", "qpsolvers proxsuite", "proximal augmented Lagrangian", "convex", True,
-                          "proxqp"),
-    "cvxpy_clarabel": SolverEntry(f"{_HERE}.cones", "cvxpy clarabel", "interior point", "convex", True, "CLARABEL"),
-    "cvxpy_osqp": SolverEntry(f"{_HERE}.cones", "cvxpy osqp", "ADMM", "convex", True, "OSQP"),
-    "cvxpy_scs": SolverEntry(f"{_HERE}.cones", "cvxpy scs", "ADMM on the conic form", "convex", True, "SCS"),
-    "nsgs": SolverEntry(f"{_HERE}.sweeps", "numba", "block Gauss-Seidel on the cones", "cone", True),
-    "newton_cones": SolverEntry(f"{_HERE}.cones", "scipy", "ADMM, then semismooth Newton", "cone", True, "newton"),
-    "cvxpy_socp": SolverEntry(f"{_HERE}.cones", "cvxpy clarabel", "interior point, fixed point", "cone", True, "socp"),
+    "gauss_seidel": SolverEntry(f"{_HERE}.sweeps", "numba", "projected Gauss-Seidel", "lcp"),
+    "daqp": SolverEntry(f"{_HERE}.qp", "daqp", "dual active set", "convex", "daqp"),
+    "quadprog": SolverEntry(f"{_HERE}.qp", "qpsolvers quadprog", "Goldfarb-Idnani active set", "convex", "quadprog"),
+    "proxqp": SolverEntry(f"{_HERE}.qp", "qpsolvers proxsuite", "proximal augmented Lagrangian", "convex", "proxqp"),
+    "cvxpy_clarabel": SolverEntry(f"{_HERE}.cones", "cvxpy clarabel", "interior point", "convex", "CLARABEL"),
+    "cvxpy_osqp": SolverEntry(f"{_HERE}.cones", "cvxpy osqp", "ADMM", "convex", "OSQP"),
+    "cvxpy_scs": SolverEntry(f"{_HERE}.cones", "cvxpy scs", "ADMM on the conic form", "convex", "SCS"),
+    "nsgs": SolverEntry(f"{_HERE}.sweeps", "numba", "block Gauss-Seidel on the cones", "cone"),
+    "cvxpy_socp": SolverEntry(f"{_HERE}.cones", "cvxpy clarabel", "interior point, fixed point", "cone", "socp"),
     "pinocchio_pgs": SolverEntry(_PINOCCHIO, "pinocchio", "projected Gauss-Seidel", "cone", option="PGS"),
     "pinocchio_admm": SolverEntry(_PINOCCHIO, "pinocchio", "ADMM", "cone", option="ADMM"),
 }  # fmt: skip
@@ -84,8 +80,6 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
         if (entry.takes == "cone") != (problem.friction is not None):
             kind = "problems with friction" if entry.takes == "cone" else "frictionless problems"
             raise SolverError(f"refused: takes {kind} only")
-        if problem.two_sided.any() and not entry.bilateral:
-            raise SolverError("refused: takes one-sided contacts only")
         answer = call(problem, *filter(None, [entry.option])) if problem.size else Answer(np.zeros(0), "no contacts")
     except SolverError as error:
         answer = Answer(None, str(error), refused=str(error).startswith("refused"))

@@ -12,7 +12,6 @@ from __future__ import annotations
 from itertools import chain, combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference import Floats
@@ -28,18 +27,16 @@ _FEASIBLE = 1e-10  # tolerance of the linear program, the least that HiGHS accep
 
 def all_solutions(problem: ImpactProblem) -> list[Floats]:
     """Return one solution (n,) per active set that has any, fewest contacts first, without duplicates."""
-    if np.count_nonzero(~problem.two_sided) > LARGEST_SIZE:
+    if problem.size > LARGEST_SIZE:
         raise SolverError(f"refused: {problem.size} contacts, enumeration takes at most {LARGEST_SIZE}")
     found: list[Floats] = []
     diagonal = np.diag(problem.delassus)
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     w, b = scale[:, None] * problem.delassus * scale, scale * problem.offset
     speed = float(np.abs(b).max(initial=0.0)) or 1.0
-    joints: list[int] = np.flatnonzero(problem.two_sided).tolist()
-    contacts: list[int] = np.flatnonzero(~problem.two_sided).tolist()
-    subsets = (combinations(contacts, k) for k in range(len(contacts) + 1))
+    subsets = (combinations(range(problem.size), k) for k in range(problem.size + 1))
     for chosen in chain.from_iterable(subsets):
-        unit = _candidate(w, b / speed, problem.two_sided, sorted([*joints, *chosen]))
+        unit = _candidate(w, b / speed, list(chosen))
         if unit is None:
             continue
         p = speed * scale * unit
@@ -58,7 +55,7 @@ def solve(problem: ImpactProblem) -> Answer:
     return Answer(found[0], f"{len(found)} solutions found")
 
 
-def _candidate(w: Floats, b: Floats, two_sided: NDArray[np.bool_], active: list[int]) -> Floats | None:
+def _candidate(w: Floats, b: Floats, active: list[int]) -> Floats | None:
     """Return the solution of one active set; if W_aa is singular, by a linear program the one of least sum."""
     from scipy.optimize import linprog
 
@@ -69,10 +66,9 @@ def _candidate(w: Floats, b: Floats, two_sided: NDArray[np.bool_], active: list[
             p[active] = np.linalg.solve(columns[active], -b[active])
             return p
         passive = [i for i in range(len(b)) if i not in active]
-        bounds = [(None if two_sided[i] else 0.0, None) for i in active]
         accuracy = {"primal_feasibility_tolerance": _FEASIBLE, "dual_feasibility_tolerance": _FEASIBLE}
-        found = linprog(np.where(two_sided[active], 0.0, 1.0), -columns[passive], b[passive], columns[active],
-                        -b[active], bounds, "highs", options=accuracy)  # fmt: skip
+        found = linprog(np.ones(len(active)), -columns[passive], b[passive], columns[active],
+                        -b[active], (0.0, None), "highs", options=accuracy)  # fmt: skip
         if found.x is None:
             return None
         p[active] = found.x

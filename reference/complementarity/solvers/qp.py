@@ -12,14 +12,13 @@ Mathematical Programming 27 (1983); proxqp, Bambade and others, Robotics: Scienc
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
-_INEQUALITY, _EQUALITY = 0, 5  # daqp's `sense` of a row
+_INEQUALITY = 0  # daqp's `sense` of a row
 _ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings
 _INFINITE = 1e30  # daqp's value for an absent bound
 _PROXQP = 1e-10  # accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
@@ -30,12 +29,12 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
     if method == "proxqp":
         return _by_proxqp(problem)
     if method == "daqp":
-        return Answer(daqp(problem.factor, problem.offset, problem.two_sided), "daqp: optimal")
+        return Answer(daqp(problem.factor, problem.offset), "daqp: optimal")
     return Answer(quadprog(problem.factor, problem.offset), "quadprog: optimal")
 
 
-def daqp(rows: Floats, offset: Floats, bilateral: NDArray[np.bool_] | None = None) -> Floats:
-    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,); `bilateral` rows are equalities.
+def daqp(rows: Floats, offset: Floats) -> Floats:
+    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,).
 
     daqp is called itself, because qpsolvers does not tell an infeasible program from another failure.
 
@@ -52,8 +51,6 @@ def daqp(rows: Floats, offset: Floats, bilateral: NDArray[np.bool_] | None = Non
     scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
     upper, lower = np.full(n, _INFINITE), -offset / unit / scale
     sense = np.full(n, _INEQUALITY, dtype=np.int32)
-    if bilateral is not None:
-        upper[bilateral], sense[bilateral] = lower[bilateral], _EQUALITY
     _, _, flag, detail = daqp.solve(np.eye(d), np.zeros(d), np.ascontiguousarray(rows / unit[:, None]), upper, lower,
                                     sense, primal_tol=_ACTIVE_SET, dual_tol=_ACTIVE_SET)  # fmt: skip
     if flag < 1:
@@ -78,7 +75,7 @@ def _by_proxqp(problem: ImpactProblem) -> Answer:
 
     w = problem.factor @ problem.factor.T
     inertia, speed = float(np.abs(w).max(initial=0.0)) or 1.0, velocity_scale(problem)
-    program = Problem(w / inertia, problem.offset / speed, lb=np.where(problem.two_sided, -np.inf, 0.0))
+    program = Problem(w / inertia, problem.offset / speed, lb=np.zeros(problem.size))
     answer = solve_problem(program, solver="proxqp", eps_abs=_PROXQP, eps_rel=0.0)
     if answer.x is None:
         return Answer(None, "proxqp found no solution")

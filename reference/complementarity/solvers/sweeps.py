@@ -14,7 +14,6 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.errors import SolverError
 from reference import Floats
@@ -35,25 +34,25 @@ def solve(problem: ImpactProblem) -> Answer:
         return _on_cones(problem)
     if (np.diag(problem.delassus) < 0.0).any():
         raise SolverError("refused: W has a negative diagonal entry")
-    p, done = _projected(problem.delassus, problem.offset, problem.two_sided, velocity_scale(problem))
+    p, done = _projected(problem.delassus, problem.offset, velocity_scale(problem))
     return Answer(p, f"converged after {done} sweeps" if done >= 0 else "not converged after the last sweep")
 
 
 def projected_sweeps(rows: Floats, offset: Floats) -> Floats:
     """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,), after the last sweep without friction."""
     scale = float(np.abs(offset).max(initial=0.0)) or 1.0
-    return _projected(rows @ rows.T, offset, np.zeros(len(offset), np.bool_), scale)[0]
+    return _projected(rows @ rows.T, offset, scale)[0]
 
 
-def _projected(w: Floats, b: Floats, bilateral: NDArray[np.bool_], scale: float) -> tuple[Floats, int]:
+def _projected(w: Floats, b: Floats, scale: float) -> tuple[Floats, int]:
     """Return p (n,) after the last sweep, and the number of sweeps, or -1 if the limit is reached."""
     p = np.zeros(len(b))
     sweeps = max(_LEAST_SWEEPS, min(_SWEEPS, int(_WORK / max(1, len(b)) ** 2)))
-    return p, _sweep_lines(np.ascontiguousarray(w), b, bilateral, p, sweeps, _STILL * scale)
+    return p, _sweep_lines(np.ascontiguousarray(w), b, p, sweeps, _STILL * scale)
 
 
 @numba.njit(cache=True, fastmath=False)
-def _sweep_lines(w, b, bilateral, p, sweeps, still):  # type: ignore[no-untyped-def]
+def _sweep_lines(w, b, p, sweeps, still):  # type: ignore[no-untyped-def]
     n = len(b)
     for sweep in range(sweeps):
         largest = 0.0
@@ -63,9 +62,7 @@ def _sweep_lines(w, b, bilateral, p, sweeps, still):  # type: ignore[no-untyped-
             velocity = b[i]
             for j in range(n):
                 velocity += w[i, j] * p[j]
-            moved = -velocity / w[i, i]
-            if not bilateral[i]:
-                moved = max(-p[i], moved)
+            moved = max(-p[i], -velocity / w[i, i])
             p[i] += moved
             largest = max(largest, abs(moved) * w[i, i])
         if largest <= still:
@@ -85,13 +82,13 @@ def _on_cones(problem: ImpactProblem, sweeps: int = _SWEEPS) -> Answer:
     inertia[inertia == 0.0] = 1.0
     p = np.zeros(problem.size)
     done = _sweep_cones(np.ascontiguousarray(problem.delassus), problem.offset, problem.friction_or_zero,
-                        problem.two_sided, inertia, problem.relaxed, p, np.zeros(size), np.zeros(size), sweeps,
+                        inertia, problem.relaxed, p, np.zeros(size), np.zeros(size), sweeps,
                         _STILL_ON_CONES * velocity_scale(problem))  # fmt: skip
     return Answer(p, f"converged after {done} sweeps" if done >= 0 else f"not converged after {sweeps} sweeps")
 
 
 @numba.njit(cache=True, fastmath=False)
-def _sweep_cones(w, b, mu, joints, inertia, relaxed, p, u, trial, sweeps, still):  # type: ignore[no-untyped-def]
+def _sweep_cones(w, b, mu, inertia, relaxed, p, u, trial, sweeps, still):  # type: ignore[no-untyped-def]
     size = len(trial)
     for sweep in range(sweeps):
         largest = 0.0
@@ -104,12 +101,11 @@ def _sweep_cones(w, b, mu, joints, inertia, relaxed, p, u, trial, sweeps, still)
                         u[i] += w[first + i, j] * p[j]
                     if i > 0:
                         slip += u[i] * u[i]
-                if not relaxed and not joints[k]:
+                if not relaxed:
                     u[0] += mu[k] * math.sqrt(slip)
                 for i in range(size):
                     trial[i] = p[first + i] - u[i] / inertia[k]
-                if not joints[k]:
-                    _project(trial, mu[k])
+                _project(trial, mu[k])
                 for i in range(size):
                     largest = max(largest, abs(trial[i] - p[first + i]) * inertia[k])
                     p[first + i] = trial[i]

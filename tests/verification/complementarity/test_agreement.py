@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from iapb.errors import IapbError
 from iapb.scene import find_scene, load_scene
-from reference.complementarity.problem import ImpactProblem
-from reference.datasets import write_fclib
 from reference.worlds import run_world
+from tests.reference.fclib_files import local_file
 from verification.check import Study
 from verification.complementarity import agreement as study
 from verification.complementarity.families import FAMILIES, random_cases, two_contacts
@@ -95,7 +94,7 @@ def test_piles_agree_only_where_they_are_small_and_pushing_is_the_lcp() -> None:
 
 def test_recorded_piles_are_their_normal_rows(tmp_path: Path) -> None:
     rows = np.random.default_rng(0).normal(size=(60, 12))
-    write_fclib(tmp_path / "pile.hdf5", ImpactProblem.from_delassus(rows @ rows.T, rows @ np.ones(12), 0.0, 0.4))
+    local_file(tmp_path / "pile.hdf5", rows @ rows.T, rows @ np.ones(12), np.full(20, 0.4))
     (tmp_path / "broken.lcp").write_text("3 1 2")
     (case,) = recorded_piles(tmp_path, 100)
     assert case.contacts == 20 and case.family == "recorded: pile.hdf5"

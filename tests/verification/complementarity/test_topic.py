@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from reference.complementarity.problem import ImpactProblem
-from reference.datasets import StoredProblem, write_fclib
+from reference.datasets import StoredProblem
+from tests.reference.fclib_files import local_file
 from verification.check import Study
 from verification.complementarity import extensions
 from verification.complementarity.extensions import BAR, FRICTION, LAW_OF_UNEQUAL, UNEQUAL
@@ -84,7 +85,7 @@ def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monke
 def test_a_folder_of_problems(tmp_path: Path) -> None:
     """A frictional, a frictionless asymmetric and a damaged file."""
     w = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    write_fclib(tmp_path / "one.hdf5", ImpactProblem.from_delassus(w, [-1.0, 0.2, 0.1], 0.0, 0.5))
+    local_file(tmp_path / "one.hdf5", w, [-1.0, 0.2, 0.1], [0.5])
     (tmp_path / "skew.lcp").write_text("2  2 1  0 2  -1 -1")
     (tmp_path / "damaged.lcp").write_text("3 1 2")
     (tmp_path / "readme.md").write_text("not a problem")
