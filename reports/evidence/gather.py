@@ -48,7 +48,6 @@ SEEDS = {
     "claims": "verification.check", "properties": "verification.laws.topic",
     "proofs": "verification.proofs.numbers", "robots": "verification.mechanics.against_pinocchio",
     "mass matrices": "verification.mechanics.definiteness",
-    "coordinates": "verification.mechanics.coordinate_invariance",
 }  # fmt: skip
 ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since
 UNNAMED = "the report"  # the user of a run that no claim, topic or figure requested

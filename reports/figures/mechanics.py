@@ -1,4 +1,4 @@
-"""Checks of the mechanics: other coordinates (C06), false collisions (C18), impacts of touching balls.
+"""Check of the mechanics: impacts of touching balls.
 
 The outcomes of the impacts are labelled with the changes of energy and momentum. All treatments except per-body rows
 conserve both, but their outcomes differ nevertheless, because the choice of rows decides the outcome.
@@ -12,91 +12,8 @@ from typing import Any, NamedTuple
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot, arrow, note
-from reports.figures.style import BOUND, FORCE, INK, MUTED, PAPER, STYLES, LineStyle, line_arguments, looks_of
+from reports.figures.style import FORCE, INK, MUTED, PAPER, STYLES, LineStyle
 from verification.table import Table
-
-_LOOKS = looks_of(("absolute angles", "place of the hand"))
-_STRAIGHT = 1e-13  # [rad] where the straight arm itself is drawn, on an axis that has no zero
-_SMALLEST = 1e-18  # an error of zero is drawn here
-_SHOWN = ("one", "two, separated")  # contacts of the first panel: well conditioned ones
-
-
-@recipe("coordinate-invariance", "mechanics/coordinate invariance")
-def coordinate_invariance(numbers: Table) -> Drawn:
-    """Draw the motion through the singular pose, and the error of every case against its bound."""
-    rows = [row | {"elbow": max(row["elbow"], _STRAIGHT),
-                   "drawn": None if row["error"] is None else max(row["error"], _SMALLEST)}
-            for row in numbers.records()]  # fmt: skip
-    told = [row for row in rows if row["bound"] < 1.0 and row["error"] is not None]
-    share = max(row["error"] / row["bound"] for row in told)
-    words = f"{len(told)} cases with a bound below 1; the largest error is {share:.1e} of its bound."
-    size = (4.3, 3.3)
-    with Plot("coordinate-invariance-pose", size) as pose, Plot("coordinate-invariance-bound", size) as bound:
-        for name, look in _LOOKS.items():
-            mine = [row for row in rows if row["coordinates"] == name]
-            shown = [row for row in mine if row["contacts"] in _SHOWN]
-            bounds: dict[float, float] = {}
-            for row in sorted(shown, key=lambda row: -float(row["elbow"])):
-                bounds[row["elbow"]] = max(row["bound"], bounds.get(row["elbow"], 0.0))
-            pose.curve(bounds.items(), LineStyle(look.color, "", BOUND.dash, 1.3))
-            pose.marks([(row["elbow"], row["drawn"]) for row in shown if row["drawn"]], look, markersize=5)
-            bound.marks([(row["bound"], row["drawn"]) for row in mine if row["drawn"]], look, markersize=5)
-        pose.axes.axhline(1.0, color=MUTED, linewidth=0.8)
-        pose.axes.xaxis.set_inverted(True)
-        pose.log("angle of the elbow [rad], straight at the right end", "error of v⁺, kinetic metric")
-        note(pose.axes, (1.0, 1.0), "no digit is right above", (0, 7), ha="left", color=MUTED, fontsize=8)
-        high = max(row["bound"] for row in rows)
-        bound.curve([(1e-15, 1e-15), (high, high)], BOUND, marked=False)
-        bound.axes.axvline(1.0, color=MUTED, linewidth=0.8)
-        bound.log("bound C ε κ(M) κ(∂f/∂r)² / σ_min", "error of v⁺", ylim=(0.3 * _SMALLEST, 1e4))
-        note(bound.axes, (1.0, 1e-17), "the bound says nothing beyond", (4, 0), ha="left", color=MUTED, fontsize=8)
-    panels = Panel(pose.svg, words, "Towards the straight arm"), Panel(bound.svg, words, "Error against bound")
-    names = ("in absolute angles", "in the place of the hand", "bound")
-    return Drawn(panels, numbers, zip(names, (*_LOOKS.values(), BOUND), strict=True))
-
-
-FILTERS = looks_of(("no filter", "coherence alone", "clustering alone", "both filters"))
-_DAMPING = 40.0  # [N s/m] of the panels in time: the scene's own
-_DURATION = 2.0  # [s]
-
-
-@recipe("socket-collisions", "mechanics/false collisions in time", "mechanics/false collisions")
-def socket_collisions(times: Table, counts: Table) -> Drawn:
-    """Draw collision counts and energy losses over time, and the counts over damping."""
-    found = ", ".join(f"{row['filters']} {row['false collisions']}"
-                      for row in counts.where(damping=_DAMPING).records())  # fmt: skip
-    words = f"False collisions in two seconds at {_DAMPING:g} N s/m: {found}."
-    panels, here = [], times.where(damping=_DAMPING)
-    none = " and ".join(setting for setting in FILTERS if setting not in here.column("filters"))
-    for column, label, alt, title in (
-        ("false collisions so far", "false collisions so far", words, f"False collisions, {_DAMPING:g} N s/m"),
-        ("energy lost so far, share of the fall", "lost in them, share of the fall",
-         "Energy lost in false collisions, cumulative.", "Energy that they take"),
-    ):  # fmt: skip
-        with Plot(f"socket-collisions-{times.keys.index(column)}") as plot:
-            for setting, style in FILTERS.items():
-                mine = here.where(filters=setting)
-                time, value = [0.0, *mine.column("time"), _DURATION], [0.0, *mine.column(column)]
-                look = line_arguments(style, marked=bool(mine.rows)) | {"markevery": 4, "clip_on": False}
-                look["gid"] = look["gid"] if mine.rows else None  # the note below names it
-                plot.axes.step(time, [*value, value[-1]], where="post", **look)
-            plot.axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, _DURATION))
-            plot.axes.set_ylim(bottom=0.0)
-            note(plot.axes, (_DURATION, 0.0), f"{none}: none" if none else "", (-2, 8), ha="right", fontsize=8.5)
-        panels.append(Panel(plot.svg, alt, title))
-    dampings = sorted(set(counts.column("damping")))
-    with Plot("socket-collisions-damping") as plot:
-        for number, (setting, style) in enumerate(FILTERS.items()):
-            mine = counts.where(filters=setting)
-            places = [dampings.index(damping) + 0.2 * (number - 1.5) for damping in mine.column("damping")]
-            bars = plot.axes.bar(places, mine.column("false collisions"), width=0.17, color=style.color)
-            plot.axes.bar_label(bars, fontsize=8, padding=2)
-        plot.axes.set_xticks(range(len(dampings)), [f"{b:g}" for b in dampings])
-        plot.axes.grid(visible=False, axis="x")
-        plot.axes.set(xlabel="damping of the contact [N s/m]", ylabel="false collisions in 2 s")
-    panels.append(Panel(plot.svg, words, "By damping of the contact"))
-    return Drawn(panels, counts, FILTERS)
-
 
 # start of a treatment's name -> its look
 TREATMENTS = {

@@ -2,26 +2,85 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from functools import cache
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from iapb.run import Run
+from iapb.scene import Scene, find_scene, load_scene
 from verification.check import Check, Study
 from verification.finding import BEYOND
-from verification.mechanics.false_collisions import LARGEST_SPEED, count_false, edge_jump, socket
 from verification.region import Region
 from verification.table import Row, Table
 
 BOTH = "both filters, coherence distance above speed × step (the paper's condition)"
 COHERENCE_ALONE, CLUSTERING = "coherence alone", "clustering alone"
 JUMP, REACH = "jump of the contact to the next facet", "relative coherence distance"
-FACETS = (9, 18, 30, 60)  # in a right angle: 10° to 1.5° each
+SCENE, SCENE_FACETS = "faceted_socket", 9
+RADIUS, BALL_RADIUS = 0.2, 0.02  # [m]
+STEEP = math.radians(70.0)  # [rad] of the ball's start, from the lowest point
+LARGEST_SPEED = 1.2445  # [m/s] of a ball that rolls down from there without loss
+FACETS = (SCENE_FACETS, 18, 30, 60)  # in a right angle: 10° to 1.5° each
 CLUSTER = {"quick": (4.0,), "full": (4.0, 10.0)}  # [mm], more than the contacts at an edge are apart
 COHERENCE = (1.1, 1.5, 2.0, 3.0, 4.0, 6.0)  # of speed × step
 DAMPING = (10.0, 20.0, 60.0)  # [N s/m]
 FRESH = 40  # sockets drawn to confirm a region
 RATES = {"quick": (1000.0,), "full": (500.0, 1000.0, 2000.0)}  # [Hz]
+
+
+def edge_jump(facets: int) -> float:
+    """Distance [m] between the ball's two contacts at an edge, which is the jump of a contact from facet to facet."""
+    return 2.0 * BALL_RADIUS * math.sin(0.25 * math.pi / facets)
+
+
+def socket(contact: Mapping[str, Any], rate: float, facets: int) -> Scene:
+    """Return the socket with some contact values changed, at a rate [Hz] and with facets in a right angle."""
+    values: dict[str, Any] = {f"contact.{name}": value for name, value in contact.items()}
+    return _faceted(facets).with_values(values | {"rate": rate})
+
+
+@cache
+def _faceted(facets: int) -> Scene:
+    """Return the shipped scene, or the same socket and start with another number of facets in a right angle."""
+    scene = load_scene(find_scene(SCENE))
+    if facets == SCENE_FACETS:
+        return scene
+    angle = 0.5 * math.pi / facets
+
+    def point(radius: float, number: float) -> list[float]:
+        return [radius * math.sin(number * angle), -radius * math.cos(number * angle)]
+
+    corners = (1.0, -0.5), (1.1, -0.5), (1.1, 0.5), (1.0, 0.5)
+    walls = [
+        {
+            "name": f"facet_{number}",
+            "kind": "polygon",
+            "vertices": [point(RADIUS * out, number + side) for out, side in corners],
+        }
+        for number in range(-facets, facets + 1)
+    ]
+    touching = RADIUS * math.cos(0.5 * angle) - BALL_RADIUS + 1e-6  # by a micrometre
+    start = point(touching, -round(STEEP / angle))
+    return scene.with_values({"walls": walls, "bodies.ball.position": [*start, 0.0]})
+
+
+def count_false(run: Run) -> dict[str, int]:
+    """Count the collisions after the first contact, those in the step after one without contact, and double contacts.
+
+    In a round socket the ball has one contact in each step and no collision after the first.
+    """
+    per_step = np.diff(run.contacts.offsets)
+    first = int(np.flatnonzero(per_step)[0])
+    later = run.impacts.step[run.impacts.step > first]
+    return {
+        "false collisions": len(later),
+        "on return": int(np.sum(per_step[later - 1] == 0)),
+        "doubled contacts": int(np.maximum(per_step - 1, 0).sum()),
+    }
 
 
 class Socket(NamedTuple):
@@ -72,7 +131,7 @@ def _row(study: Study, case: Socket) -> Row:
     }  # fmt: skip
 
 
-def _found(study: Study, case: Socket) -> dict[str, Any]:
+def _found(study: Study, case: Socket) -> dict[str, int]:
     contact = {"damping": case.damping, "cluster_distance": 1e-3 * case.cluster,
                "coherence_distance": case.coherence * LARGEST_SPEED / case.rate}  # fmt: skip
     return study.once(("socket", case), lambda: count_false(

@@ -15,7 +15,6 @@ import numpy as np
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import SolverError
 from reference.complementarity.laws import (
-    LAWS,
     coulomb_ccp,
     coulomb_ncp,
     newton_equality,
@@ -37,7 +36,6 @@ SAME_LAW = 1e-8
 RESTITUTIONS, FRICTIONS = (0.0, 0.5, 1.0), (0.1, 0.5, 1.0)
 COUNTS = {"quick": 40, "full": 300}  # impacts of each e and μ
 UNEQUAL_COUNTS = {"quick": 100, "full": 1000}
-LAW_OF_UNEQUAL = "IAPB, unequal restitution"
 
 
 def draw(rng: np.random.Generator, approaching: bool) -> ImpactCase:
@@ -147,22 +145,4 @@ UNEQUAL = Check(
     note="The last three columns: largest (KE⁺ − KE⁻)/KE⁻ of each law. Mixed signs: some contacts separate before.",
     holds=lambda row: bool(row["distance from Poisson's law"] <= SAME_LAW
                            and row["largest change of KE, IAPB"] <= GAIN),
-)  # fmt: skip
-
-
-def struck_bar(study: Study, law: str) -> Row:
-    """Return the kinetic energy [J] by one law of the bar of docs/theory.md, struck at 0.5 and 0.4 with e = (1, 0)."""
-    mass, rows = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, 0.4]])
-    velocity, e = np.array([-1.0, 0.0]), (1.0, 0.0)
-    if law in LAWS:
-        v = LAWS[law].apply(ImpactProblem.from_impact(mass, rows, velocity, e)).velocity
-    else:
-        v = velocity if law == "before" else resolve_impact(mass, rows, velocity, e).velocity
-    return {"law": law, "kinetic energy [J]": 0.5 * float(v @ mass @ v)}
-
-
-BAR = Check(
-    key="struck bar", question="", digits=5, row=struck_bar,
-    cases=lambda study: ("before", "newton_equality", "newton_lcp", "poisson", LAW_OF_UNEQUAL),
-    note="The bar is struck at two contacts: with e = 1 at its end, with e = 0 at 0.4 of its length from the centre.",
 )  # fmt: skip

@@ -13,7 +13,7 @@ from reference.worlds import WORLDS
 from verification.check import Check, Study, Topic
 from verification.complementarity.agreement import MAP, TWO_CONTACTS
 from verification.complementarity.convergence import CONVERGENCE
-from verification.complementarity.extensions import BAR, FRICTION, UNEQUAL
+from verification.complementarity.extensions import FRICTION, UNEQUAL
 from verification.complementarity.piles import piles
 from verification.complementarity.solvers import OWN, SOLVER_LIST, collections
 from verification.cost.solvers import IMPACT_TIMES
@@ -42,7 +42,7 @@ def complementarity(folders: Mapping[str, Path], worlds: Iterable[str] = ()) -> 
         "scenes, and problems that solvers find hard. A solver's solution counts only if its residuals, recomputed "
         "from the problem, are small. Velocities after the impact are compared in the kinetic metric, relative to "
         "|v⁻|.",
-        checks=(MAP, TWO_CONTACTS, piles(folders.values()), FRICTION, UNEQUAL, BAR, CONVERGENCE, REFERENCES,
+        checks=(MAP, TWO_CONTACTS, piles(folders.values()), FRICTION, UNEQUAL, CONVERGENCE, REFERENCES,
                 IMPACT_TIMES, *collections({OWN: None, **folders}), LAW_LIST, SOLVER_LIST,
                 *([_world_list(worlds)] if worlds else [])),
         says=_answer,
