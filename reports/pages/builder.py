@@ -153,10 +153,10 @@ def ranked(found: Iterable[Any]) -> list[Any]:
 
 
 def worst_first(cases: Iterable[Finding]) -> list[Finding]:
-    """Return the hard cases: those that the engine fails, then by the number of methods that fail, absent ones last."""
-    def rank(case: Finding) -> tuple[bool, bool, int]:
-        failing = [part.name for part in case.parts if part.verdict != finding.REPRODUCED]
-        return not case.computed, not any(name in ENGINE for name in failing), -len(failing)
+    """Return the hard cases: those that the engine fails, then by the number of methods that fail."""
+    def rank(case: Finding) -> tuple[bool, int]:
+        failing = [part.name for part in case.parts if part.verdict == finding.REFUTED]
+        return not any(name in ENGINE for name in failing), -len(failing)
 
     return sorted(cases, key=rank)
 

@@ -35,8 +35,8 @@ from verification import finding
 from verification.claims import CLAIMS
 from verification.claims.conditions import FULL_GRID
 from verification.claims.peg import ALL_THREE, LARGE
-from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Finding, Part, finding_of
-from verification.hard_cases.findings import STABLE, finding_on, on_hard_cases
+from verification.finding import MIXED, NOT_COMPUTED, REFUTED, REPRODUCED, Part, finding_of
+from verification.hard_cases.findings import NOT_TRIED, STABLE, finding_on, on_hard_cases
 from verification.laws.topic import counterexample, properties
 from verification.region import Region
 from verification.table import table_from, titled
@@ -104,7 +104,6 @@ EVIDENCE = Evidence(
                            [("gravity", False, "none in the scene", "", None, None)])},
     provenance={"commit": "abc"}, manifest=(*RUNS, *TABLES),
 )  # fmt: skip
-SKIPPED = Finding("bowl", "bowl", "", "needs bowl.lcp", NOT_COMPUTED, details={"source": "published problems"})
 
 
 @pytest.fixture(scope="module", params=[Evidence(), EVIDENCE], ids=["empty", "full"])
@@ -161,20 +160,19 @@ def test_the_pages_say_what_the_records_say_escaped_counted_and_with_their_sourc
 
 
 def test_hard_cases_are_seen_at_a_glance_the_engines_failures_first_and_a_refusal_is_no_number():
-    case = hard_case(("factored", "stable", 1e-16), ("gram", "refused", None))
-    page = joined(Evidence(hard_cases=(case, SKIPPED)))
+    case = hard_case(("factored", "stable", 1e-16), ("gram", "refused", None), ("damped", NOT_TRIED, None))
+    page = joined(Evidence(hard_cases=(case,)))
     for text in ('<span class="good">✓</span>&nbsp;factored: stable', '<span class="bad">✕</span>&nbsp;gram: refused',
-                 "1 of 2 stable", "Skipped: needs bowl.lcp."):
+                 '<span class="open">○</span>&nbsp;damped: not tried', "1 of 2 stable"):
         assert text in page, text
     stiff = replace(hard_case(("IAPB", "gains energy", 0.5)), title="stiff wall")
     found = on_hard_cases((hard_case(("IAPB", "stable", 0.0)), stiff))
     assert found.verdict == MIXED and "1 of 2" in found.answer and "“stiff wall” (gains energy)" in found.answer
     assert found.parts[0].miss == "1 of 2 hard cases fails: “stiff wall” (gains energy)"
-    assert "1 cases were skipped" in on_hard_cases((stiff, SKIPPED)).answer
     calm, others, ours = (finding_on(name, name, table_from([{"method": "factored", "outcome": own}, {
         "method": "svd", "outcome": other}]), {}) for name, own, other in (
             ("calm", STABLE, STABLE), ("others", STABLE, "refused"), ("ours", "wrong motion", STABLE)))  # fmt: skip
-    assert worst_first([SKIPPED, calm, others, ours]) == [ours, others, calm, SKIPPED]
+    assert worst_first([calm, others, ours]) == [ours, others, calm]
 
 
 @pytest.mark.parametrize(("text", "shown"), [

@@ -1,7 +1,6 @@
 """Two topics from their runs to their sentences: the hard cases, and the energy books of the scenes."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -17,9 +16,8 @@ from verification.scenes.books import residual_row
 NAMES = ("peg_corner", "peg_hole_space", "arm_obstacles", "tumbling_body")
 
 
-def test_every_hard_case_is_a_record_with_a_row_for_each_method_and_an_absent_file_is_one_too(tmp_path, monkeypatch):
-    keys = ["grazing", "nearly_parallel_normals", "chatter", "bowl_of_low_rank"]
-    monkeypatch.setattr("verification.hard_cases.shared_problems.FOLDER", Path("nowhere"))
+def test_every_hard_case_is_a_record_with_a_row_for_each_method(tmp_path, monkeypatch):
+    keys = ["grazing", "nearly_parallel_normals", "chatter"]
     monkeypatch.setattr(findings, "HARD_CASES", {name: catalogue.HARD_CASES[name] for name in keys})
     runner = Runner(tmp_path)
     cases = findings.hard_cases(runner, lambda done, total: None, [])
@@ -28,7 +26,6 @@ def test_every_hard_case_is_a_record_with_a_row_for_each_method_and_an_absent_fi
     outcomes = [{part.name: part.sentence for part in case.parts} for case in cases]
     assert outcomes[0]["factored"] == "stable" and outcomes[1]["gram_cholesky"] == "gains energy"
     assert (cases[2].details["kind"], outcomes[2]["IAPB"]) == ("motion", "stable")
-    assert "bowl.5" in cases[3].answer and not cases[3].computed and not cases[3].tables
     assert len(findings.on_hard_cases(cases).tables["every method"].rows) == sum(len(case.parts) for case in cases)
 
 

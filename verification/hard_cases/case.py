@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.errors import IapbError
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from reference.exact import condition_number, exact_impact, row_condition_number
@@ -25,11 +24,7 @@ NEWTON_COULOMB = "Newton with Coulomb"  # Newton's law with Coulomb friction, as
 COULOMB = "ideal with friction"  # the rigid world with Coulomb friction; the paper's rigid worlds have none
 RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
 NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps
-STABLE, DEPENDS_ON_ROUNDING = "stable", "depends on rounding"
-
-
-class CaseAbsent(IapbError):
-    """The files of a case are absent; the message names them."""
+STABLE, DEPENDS_ON_ROUNDING, NOT_TRIED = "stable", "depends on rounding", "not tried"
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from reference.one_thread import one_thread
 from verification.check import Check, Study
 from verification.finding import (
-    NOT_COMPUTED,
+    NOT_TESTABLE,
     REFUTED,
     REPRODUCED,
     Failure,
@@ -19,7 +19,7 @@ from verification.finding import (
     verdict_of_trials,
 )
 from verification.hard_cases import judge
-from verification.hard_cases.case import STABLE, CaseAbsent, TrajectoryCase
+from verification.hard_cases.case import NOT_TRIED, STABLE, TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.table import Table
 
@@ -44,7 +44,7 @@ _NOTES = {
 def hard_cases(
     simulate: judge.Simulate, progress: Callable[[int, int], None], failures: list[Failure]
 ) -> tuple[Finding, ...]:
-    """Return one finding per case with one part per method; the finding of a case without its files says so."""
+    """Return one finding per case with one part per method."""
     study = Study(simulate, failures=failures)
     with one_thread():
         return tuple(study.each(counted(HARD_CASES, progress), lambda name: [_judged(study, name)]))
@@ -52,19 +52,17 @@ def hard_cases(
 
 def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) -> Finding:
     """Return the finding on the engine; its table has every method and world on every case."""
-    tried = [case for case in cases if case.computed]
-    by = {case.title: {part.name: part.sentence for part in case.parts} for case in tried}
+    by = {case.title: {part.name: part.sentence for part in case.parts} for case in cases}
     ours = {title: next((found[name] for name in ENGINE if name in found), "") for title, found in by.items()}
-    failing = [f"{name}” ({outcome or 'not tried'})" for name, outcome in ours.items() if outcome != STABLE]
-    skipped = len(cases) - len(tried)
+    failing = [f"{name}” ({outcome or NOT_TRIED})" for name, outcome in ours.items() if outcome != STABLE]
     stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
     sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer and gains no more energy "
                 "than rounding or the time step explain." + (f" It fails in “{'; “'.join(failing)}." if failing else "")
-                + (f" {skipped} cases were skipped because their files are absent." if skipped else ""))  # fmt: skip
+    )  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
     question = "Is the engine stable on problems on which other methods fail?"
     rows = [{"case": case.title, "kind": case.details["kind"], **row, "note": ""}
-            for case in tried for row in case.tables[case.key].by_title()]  # fmt: skip
+            for case in cases for row in case.tables[case.key].by_title()]  # fmt: skip
     table = EVERY_METHOD.table_of(rows)
     miss = f"{len(failing)} of {len(ours)} hard cases fail{'s' * (len(failing) == 1)}: “{failing[0]}" if failing else ""
     parts = (Part(sentence, verdict, miss=miss, quantities=(stable,)),)
@@ -73,11 +71,7 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
 
 
 def _judged(study: Study, name: str) -> Finding:
-    try:
-        case = study.once(name, HARD_CASES[name])
-    except CaseAbsent as absent:
-        return Finding(name, name.replace("_", " "), "", str(absent), NOT_COMPUTED,
-                       details={"source": "published problems"})  # fmt: skip
+    case = study.once(name, HARD_CASES[name])
     kind = "motion" if isinstance(case, TrajectoryCase) else "impact"
     pairs = [(name, method) for method in judge.methods_for(case)]
     table = replace(EVERY_METHOD, note=_NOTES[kind]).table(study, pairs)
@@ -88,11 +82,11 @@ def _judged(study: Study, name: str) -> Finding:
 
 def finding_on(key: str, title: str, table: Table, details: dict[str, str]) -> Finding:
     """Return the finding on a case from a table with one row per method or world."""
-    parts = tuple(Part(row["outcome"], REPRODUCED if row["outcome"] == STABLE else REFUTED, row["method"])
-                  for row in table.records())  # fmt: skip
-    stable = [part.verdict == REPRODUCED for part in parts]
-    found = finding_of(key, title, "Which methods are stable?", f"{sum(stable)} of {len(parts)} stable", parts,
-                       {key: table})  # fmt: skip
+    verdicts = {STABLE: REPRODUCED, NOT_TRIED: NOT_TESTABLE}
+    parts = [Part(row["outcome"], verdicts.get(row["outcome"], REFUTED), row["method"]) for row in table.records()]
+    stable = [part.verdict == REPRODUCED for part in parts if part.sentence != NOT_TRIED]
+    answer = f"{sum(stable)} of {len(stable)} stable"
+    found = finding_of(key, title, "Which methods are stable?", answer, parts, {key: table})
     return replace(found, verdict=verdict_of_trials(stable), details=details)
 
 

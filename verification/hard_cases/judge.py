@@ -4,18 +4,13 @@ An impact method is judged by its energy gain, restitution residual and distance
 create no energy, and its error may not exceed the error that its time step may cause.
 
 A method that forms the Delassus matrix of thousands of contacts takes minutes and gigabytes, and Python cannot
-interrupt a C routine. Such a call therefore runs in its own process. Its time starts when the process has compiled the
-kernels. A call beyond the time limit is killed and reported as timed out.
+interrupt a C routine. Such a method is not tried on more than MOST_CONTACTS contacts, and its row says so.
 """
 
 from __future__ import annotations
 
 import math
-import os
-import pickle
 import statistics
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -32,13 +27,13 @@ from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
 from reference.exact import fractions_of, rational_matrix, relative_energy_gain
-from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
 from reference.worlds import require_complete, run_world
 from verification.hard_cases.case import (
     COULOMB,
     DEPENDS_ON_ROUNDING,
     NEWTON_COULOMB,
+    NOT_TRIED,
     RESTITUTION_TOLERANCE,
     STABLE,
     AnyCase,
@@ -71,11 +66,7 @@ _NOISE = 10.0  # a residual within this factor of the tolerance decides nothing
 # An error of more than half of |v⁻| is entirely noise, and the sign of the energy gain is then random (relative gains
 # of −1e-3 to 1e-4, depending on the BLAS, for the printed formula on rows 1e-4 apart).
 _ALL_NOISE = 0.5
-_MANY_CONTACTS = 2000  # from here on these methods run in their own process: the SVD of W takes a second
-
-LIMIT_SECONDS = 2.0  # [s] two thousand haptic steps; a slower method is of no use for haptics
-LIMIT_BYTES = 6 << 30  # address space: seven matrices of 10,000 x 10,000 doubles and the libraries
-_READY = b"ready\n"
+MOST_CONTACTS = 2000  # on which these methods are tried: the SVD of W takes a second
 
 
 def run_in_world(scene: Scene, world: str) -> Run:
@@ -106,10 +97,10 @@ _NUMBERS = (
 def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_world) -> Row:
     """Return the row of one method on one impact, or of one world on one trajectory.
 
-    The outcome is "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "timed out", "out of
-    memory", "failed", or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their residual is within a
-    factor of ten of the tolerance, or their error exceeds half of |v⁻|, so another BLAS may change the outcome. The
-    rank is the one that the method used, or the largest of a run's impacts; the time is that of a call or a step.
+    The outcome is "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "failed", NOT_TRIED
+    or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their residual is within a factor of ten of the
+    tolerance, or their error exceeds half of |v⁻|, so another BLAS may change the outcome. The rank is the one that the
+    method used, or the largest of a run's impacts; the time is that of a call or a step.
     """
     return judge_impact(case, method) if isinstance(case, HardCase) else _judge_motion(case, method, simulate)
 
@@ -155,7 +146,7 @@ def _verdict(passive: bool, restored: bool, right: bool) -> str:
 
 
 def _verdict_of(error: IapbError) -> str:
-    return getattr(error, "verdict", "refused" if isinstance(error, ValueError) else "failed")
+    return "refused" if isinstance(error, ValueError) else "failed"
 
 
 def faulty_motion(run: Run, fault: float) -> Run:
@@ -198,22 +189,6 @@ def restitution_residual(run: Run) -> float:
     return float(np.max(np.abs(after + e * before)[judged] / (after - before)[judged]))
 
 
-class TimedOut(IapbError):
-    """A call exceeded its time limit."""
-
-    verdict = "timed out"
-
-
-class OutOfMemory(IapbError):
-    """A call exceeded its memory limit."""
-
-    verdict = "out of memory"
-
-
-def _out_of_memory(most_bytes: int) -> OutOfMemory:
-    return OutOfMemory(f"needs more than {most_bytes / 2**30:g} GiB")
-
-
 class Answer(NamedTuple):
     """The judged quantities of an impact, v⁺ and rank (None: not known), and the time of the call [s]."""
 
@@ -227,10 +202,13 @@ def judge_impact(case: HardCase, method: str) -> Row:
     truth = case.truth
     energy_bound = 10.0 * len(case.velocity) * EPS * float(np.sqrt(truth.condition))
     forward_bound = allowed_error(case)
+    known = math.nan, energy_bound, math.nan, math.nan, forward_bound, math.nan
+    if method in _FORM_DELASSUS and len(case.contact_jacobian) > MOST_CONTACTS:
+        note = f"it forms the Delassus matrix; tried on at most {MOST_CONTACTS:,} contacts"
+        return _row(method, NOT_TRIED, known, exact_rank=truth.rank, note=note)
     try:
         answer = _answer(case, method)
     except IapbError as error:
-        known = math.nan, energy_bound, math.nan, math.nan, forward_bound, math.nan
         return _row(method, _verdict_of(error), known, exact_rank=truth.rank, note=str(error))
 
     def measured(v_plus: Floats) -> tuple[str, float, float, float]:
@@ -272,8 +250,6 @@ def faulty_answers(case: HardCase, v_plus: Floats) -> list[Floats]:
 
 def _answer(case: HardCase, method: str) -> Answer:
     """Return an answer with the median time of a few calls."""
-    if len(case.contact_jacobian) >= _MANY_CONTACTS and method in _FORM_DELASSUS:
-        return bounded_impact(case, method)
     warm_up()
     first = resolve_once(case, method)
     if first.seconds >= _SLOW:
@@ -332,59 +308,3 @@ def _form(case: HardCase, vector: Any) -> Fraction:
     """Return xᵀ M x exactly."""
     x = rational_matrix("vector", vector)
     return fractions_of(x.transpose() * rational_matrix("mass_matrix", case.mass_matrix) * x)[0]
-
-
-def bounded_impact(
-    case: HardCase, method: str, limit: float = LIMIT_SECONDS, most_bytes: int = LIMIT_BYTES
-) -> Answer:
-    """Resolve one hard case by one method in a separate process.
-
-    Raises
-    ------
-    TimedOut, OutOfMemory
-        The call exceeds `limit` [s] or `most_bytes` of address space (checked on POSIX systems only).
-    IapbError
-        The resolver raised an error, or the process failed.
-    """
-    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # the separate process imports the same packages
-    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # each thread's buffers count as address space
-    environment = {**os.environ, **paths, **threads}
-    command = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, env=environment) as process:
-        if process.stdout is None or process.stdout.readline() != _READY:
-            raise IapbError("the process for a bounded call did not start")
-        try:
-            out, told = process.communicate(pickle.dumps((case, method, most_bytes)), timeout=limit)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            raise TimedOut(f"cut after {limit:g} s") from None
-    if b"failed init" in told:  # numpy's SVD without memory raises nothing, and its result is what memory held
-        raise _out_of_memory(most_bytes)
-    if process.returncode != 0:
-        raise IapbError(f"the process for a bounded call ended with code {process.returncode}")
-    found = pickle.loads(out)
-    if isinstance(found, Exception):
-        raise found
-    answer: Answer = found
-    return answer
-
-
-def serve() -> None:
-    """Run the separate process: compile, report that it is ready, read one call and write its answer."""
-    with one_thread():
-        warm_up()
-        sys.stdout.buffer.write(_READY)
-        sys.stdout.buffer.flush()
-        case, method, most_bytes = pickle.loads(sys.stdin.buffer.read())
-        if os.name == "posix":  # elsewhere only the time is limited
-            import resource
-
-            resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))
-        try:
-            found: Any = resolve_once(case, method)
-        except MemoryError:
-            found = _out_of_memory(most_bytes)
-        except IapbError as error:
-            found = error
-    sys.stdout.buffer.write(pickle.dumps(found))

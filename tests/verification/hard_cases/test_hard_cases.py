@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 
-import numpy as np
 import pytest
 
-from verification.hard_cases import HARD_CASES, CaseAbsent, HardCase, TrajectoryCase, judge
+from verification.hard_cases import HARD_CASES, HardCase, TrajectoryCase, judge
 from verification.hard_cases import judge_hard_case as judged
-from verification.hard_cases.case import DEPENDS_ON_ROUNDING, NEWTON_COULOMB, STABLE, AnyCase
+from verification.hard_cases.case import DEPENDS_ON_ROUNDING, NEWTON_COULOMB, NOT_TRIED, STABLE, AnyCase
 from verification.table import Row
-
-
-def case_of(name: str) -> AnyCase:
-    """A case by its name; a case of absent files skips the test, with the reason."""
-    try:
-        return HARD_CASES[name]()
-    except CaseAbsent as absent:
-        pytest.skip(str(absent))
-
 
 # Where the engine is not stable, and says so: springs read once a step pass a blow on with a gain.
 BEYOND_US = {"wall_far_beyond_the_bound": "gains energy"}
@@ -34,7 +23,7 @@ def _judged(name: str, method: str) -> Row:
 
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_the_engine_is_stable_but_where_it_says_not(name: str) -> None:
-    case = case_of(name)
+    case = HARD_CASES[name]()
     verdict = _judged(name, "factored" if isinstance(case, HardCase) else "IAPB")
     assert verdict["outcome"] == BEYOND_US.get(name, "stable"), verdict
     if isinstance(case, HardCase):
@@ -44,7 +33,7 @@ def test_the_engine_is_stable_but_where_it_says_not(name: str) -> None:
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_a_fault_of_a_tenth_in_the_answer_is_seen(name: str) -> None:
     """In the engine's answer or, where that is wrong already, in the first stable one."""
-    case, red = case_of(name), []
+    case, red = HARD_CASES[name](), []
     for method in judge.methods_for(case):
         verdict = _judged(name, method)
         if verdict["outcome"] != STABLE:
@@ -83,30 +72,18 @@ def _with_a_fault(case: AnyCase, method: str, size: float) -> str:
     ("double_pendulum_with_friction", NEWTON_COULOMB, "gains energy"),
     ("wall_beyond_the_bound", "PB", "gains energy"),
     ("chatter", "PB", "wrong motion"),
-    ("two_balls_and_a_wall", "PB", "wrong motion"),
 ])
 def test_the_verdict_can_be_other_than_stable(name: str, method: str, verdict: str) -> None:
-    case = case_of(name)
+    case = HARD_CASES[name]()
     assert method in judge.methods_for(case)
     assert (found := judged(case, method))["outcome"] == verdict, found
 
 
-def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_cut() -> None:
+def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_not_tried_and_its_row_says_so() -> None:
     case = HARD_CASES["ten_thousand_contacts"]()
-    with pytest.raises(judge.TimedOut, match=r"cut after 0\.05 s"):
-        judge.bounded_impact(case, "gram_pinv", limit=0.05)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="memory is limited on POSIX systems only")
-def test_a_call_that_needs_more_memory_than_its_limit_says_so() -> None:
-    case = HARD_CASES["ten_thousand_contacts"]()
-    with pytest.raises(judge.OutOfMemory, match="more than 1 GiB"):
-        judge.bounded_impact(case, "gram_pinv", limit=20.0, most_bytes=1 << 30)
-
-
-def test_a_bounded_call_gives_the_same_answer() -> None:
-    case = HARD_CASES["hundred_contacts"]()
-    bounded, here = judge.bounded_impact(case, "gram_pinv", limit=60.0), judged(case, "gram_pinv")
-    assert bounded.rank == here["rank"]
-    assert here["outcome"] == STABLE
-    assert np.allclose(bounded.velocity, [float(x) for x in case.truth.velocity], rtol=1e-12)
+    for method in ("gram_pinv", "gram_cholesky", "damped"):
+        row = judged(case, method)
+        assert (row["outcome"], row["rank"], row["time [µs]"]) == (NOT_TRIED, None, None)
+        assert "at most 2,000 contacts" in row["note"]
+    assert judged(case, "svd")["outcome"] == STABLE
+    assert judged(HARD_CASES["hundred_contacts"](), "gram_pinv")["outcome"] == STABLE
