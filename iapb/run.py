@@ -187,6 +187,11 @@ class Run:
         """Number of steps done; more than those recorded if the record is thinned."""
         return self.steps if self.every == 1 else round(float(self.time[-1]) / self.dt)
 
+    @property
+    def records_contacts(self) -> bool:
+        """Whether contacts and forces are recorded; another engine gives states alone (`iapb.engines`)."""
+        return len(self.state) == self.steps
+
     def __repr__(self) -> str:
         """Return the summary, and the first reason for distrust if there is one."""
         return f"<Run of {self.summary}>" if not self.distrust else (
@@ -196,10 +201,12 @@ class Run:
     def summary(self) -> str:
         """Scene, world, steps, impacts and penetration on one line."""
         end = "" if self.complete else f", stopped: {self.stopped}"
-        deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
         kept = "" if self.every == 1 else f" ({self.steps} recorded)"
-        return (f"{self.scene_name} in {self.world}: {self.steps_done} steps of {1e3 * self.dt:.4g} ms{kept}{end}, "
-                f"{len(self.impacts.step)} impacts, penetration at most {1e3 * deepest:.3g} mm")
+        done = f"{self.scene_name} in {self.world}: {self.steps_done} steps of {1e3 * self.dt:.4g} ms{kept}{end}"
+        if not self.records_contacts:
+            return f"{done}, contacts not recorded"
+        deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
+        return f"{done}, {len(self.impacts.step)} impacts, penetration at most {1e3 * deepest:.3g} mm"
 
     def _repr_html_(self) -> str:
         """The summary and the last state as a small table, for notebooks."""
@@ -218,7 +225,8 @@ class Run:
         """
         xarray = needed("xarray", "Run.to_xarray")
         listed = [(record, prefix, each) for record, prefix in (
-            (self, ""), (self.contacts, "contact_"), (self.impacts, "impact_")) for each in quantities(type(record))]
+            (self, ""), (self.contacts, "contact_"), (self.impacts, "impact_")) for each in quantities(type(record))
+            if each.dimensions[0] != "step" or self.records_contacts]
         variables = {prefix + each.name: (each.dimensions, getattr(record, each.name),
                                           {"units": unit_of(each, self), "long_name": each.meaning})
                      for record, prefix, each in listed}
@@ -233,7 +241,7 @@ class Run:
     def plot(self) -> Any:
         """Draw coordinates, energy and the deepest contact over time; return the matplotlib figure."""
         figure = needed("matplotlib.figure", "Run.plot").Figure(figsize=(8.0, 7.0), layout="constrained")
-        places, energy, depth = figure.subplots(3, 1, sharex=True)
+        places, energy, *depth = figure.subplots(2 + self.records_contacts, 1, sharex=True)
         for i, name in enumerate(self.coordinate_names[:_SHOWN]):
             places.plot(self.time, self.q[:, i], label=f"{name} [{self.coordinate_units[i]}]")
         for name in ("kinetic", "potential"):
@@ -241,11 +249,13 @@ class Run:
                 energy.plot(self.time, self.energy[name], label=name)
         deepest = np.zeros(self.steps)
         np.maximum.at(deepest, np.repeat(np.arange(self.steps), np.diff(self.contacts.offsets)), -self.contacts.gap)
-        depth.plot(self.time[:-1], 1e3 * deepest, label="deepest contact")
-        for axes, label in ((places, "coordinates"), (energy, "energy [J]"), (depth, "penetration [mm]")):
+        for axes in depth:
+            axes.plot(self.time[:-1], 1e3 * deepest, label="deepest contact")
+        drawn = [places, energy, *depth]
+        for axes, label in zip(drawn, ("coordinates", "energy [J]", "penetration [mm]"), strict=False):
             axes.set_ylabel(label)
             axes.legend(loc="best", fontsize="small")
-        depth.set_xlabel("time [s]")
+        drawn[-1].set_xlabel("time [s]")
         figure.suptitle(f"{self.scene_name} in {self.world}" + (" (not to be trusted)" if self.distrust else ""))
         return figure
 

@@ -14,9 +14,11 @@ import math
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from numbers import Integral, Real
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,7 @@ from iapb.compiling import compiling_told, to_stderr
 from iapb.contact.impact import real_numbers
 from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
+from iapb.engines import Engine, is_engine
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
@@ -247,7 +250,7 @@ class Simulation:
         return steps, None
 
 
-def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling: Coupling | None = None, *,
+def simulate(scene: Scene | str | Path, law: ContactLaw | Engine | None = None, coupling: Coupling | None = None, *,
              world: str = "", steps: int | None = None, every: int = 1,
              progress: Callable[[int, int], None] | None = None, max_memory: float | None = None) -> Run:
     """Simulate a scene in a named world, or with a contact law and a coupling, and return the run.
@@ -255,7 +258,8 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
     Parameters
     ----------
     scene : Scene, the path of a scene file, or the name of a scene of the project.
-    law, coupling : see `Simulation`; without both, those of the world.
+    law, coupling : see `Simulation`; without both, those of the world. An engine (`iapb.engines`) in place of the law
+        simulates the scene by its own method, without coupling.
     world : ``"IAPB"``, ``"PB"`` or another name of `iapb.worlds`, which selects the law, and the coupling with the
         scene's gains; default: IAPB, as in `iapb run`. If `law` is given, it is only a name for the record; default
         then: the names of law and coupling.
@@ -294,7 +298,15 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | None = None, coupling:
         world = world or "IAPB"
         chosen = find_world(world)
         law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
-    simulation = Simulation(system_of(scene), law, coupling)
+    if is_engine(law):
+        if every != 1:
+            raise ArgumentError("every", every, f"1: {law.name} records every step")
+        started = perf_counter()
+        run = law.run(scene, steps, progress)
+        seconds = run.chunk_seconds if run.chunk_seconds.any() else np.array([perf_counter() - started])
+        return replace(run, world=world or law.name, chunk_seconds=seconds)
+    contact_law: Any = law
+    simulation = Simulation(system_of(scene), contact_law, coupling)
     total = simulation.scene.steps if steps is None else int(steps)
     recorder = Recorder(simulation, int(every))
     _check_memory(recorder.bytes_per_step, total, int(every), max_memory)

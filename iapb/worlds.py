@@ -1,11 +1,16 @@
-"""Worlds by name. A world is a contact law with a coupling; `reference.worlds` adds the worlds of rigid contact."""
+"""Worlds by name. A world is a contact law with a coupling, or another engine.
+
+`reference.worlds` adds the worlds of rigid contact, and MuJoCo.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty
+from iapb.by_name import object_named
+from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.engines import Engine, is_engine
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling
 from iapb.lazy import load_extensions
@@ -15,10 +20,13 @@ from iapb.system import coupling_of
 
 
 class World(NamedTuple):
-    """A named pair of contact law and coupling; the gains of the coupling come from the scene."""
+    """A named pair of contact law and coupling; the gains of the coupling come from the scene.
+
+    An engine stands in place of the law, and has no coupling.
+    """
 
     name: str
-    law: ContactLaw
+    law: Any  # a ContactLaw, or an Engine
     coupling: str
 
     def coupling_in(self, scene: Scene) -> Coupling:
@@ -45,7 +53,7 @@ def find_world(name: str, rendering: str = "full") -> World:
 
     Parameters
     ----------
-    name : a key of `WORLDS`
+    name : a key of `WORLDS`, or an engine of one's own as ``package.module:engine``
     rendering : how IAPB respects the device's limits: full (ignores them), saturate, scale or spread
 
     Raises
@@ -53,11 +61,21 @@ def find_world(name: str, rendering: str = "full") -> World:
     ArgumentError
         There is no such world, or its law has no impulses to which a rendering applies.
     """
-    if name not in WORLDS:
+    if name not in WORLDS and ":" not in name:
         load_extensions("iapb.worlds")
-    if name not in WORLDS:
-        raise ArgumentError("world", name, one_of(name, WORLDS))
-    world = WORLDS[name](rendering)
+        if name not in WORLDS:
+            raise ArgumentError("world", name, f"{one_of(name, WORLDS)}, or your engine as module:engine")
+    world = WORLDS[name](rendering) if name in WORLDS else World(name, _engine_named(name), "none")
     if rendering != "full" and getattr(world.law, "rendering", "full") != rendering:
         raise ArgumentError("rendering", rendering, f"full: the law of the world {name} has no impulses to fit")
     return world
+
+
+def _engine_named(name: str) -> Engine:
+    """Import an engine by name: an object, or a class that makes one without arguments."""
+    found: Any = object_named("world", name, "module:engine")
+    engine: Any = found() if isinstance(found, type) else found
+    if not is_engine(engine):
+        raise ArgumentError("world", name, "an engine: an object with name, settings, ignored(scene) and run(scene)")
+    made: Engine = engine
+    return made

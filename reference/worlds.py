@@ -9,6 +9,7 @@
 | ideal-friction | rigid constraints with Coulomb's law of friction, by complementarity | four-channel |
 | IAPB-friction | impulses with Coulomb friction, and penalties | four-channel |
 | IAPB-push | impulses that only push (two LCPs), and penalties | four-channel |
+| mujoco | MuJoCo's own contacts (`reference.mujoco`) | none |
 
 The worlds of the engine are in `iapb.worlds`; this module adds the rigid ones. The paper's rigid worlds, ideal and
 CBuc, have no friction: they ignore the friction of the scene, and the run records this. Restitution that differs
@@ -25,6 +26,7 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import require_complete, simulate
 from iapb.worlds import WORLDS, World, find_world
+from reference.mujoco import MuJoCo
 from reference.one_thread import one_thread
 from reference.time_stepping import RigidConstraints
 
@@ -33,6 +35,7 @@ WORLDS |= {
     "ideal": lambda rendering: World("ideal", RigidConstraints(), "four-channel"),
     "CBuc": lambda rendering: World("CBuc", RigidConstraints(), "unilateral"),
     "ideal-friction": lambda rendering: World("ideal-friction", RigidConstraints(friction="coulomb"), "four-channel"),
+    "mujoco": lambda rendering: World("mujoco", MuJoCo(), "none"),
 }
 
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from iapb.by_name import function_named
 from iapb.errors import RunFileError
 from iapb.scene import scene_from_text
 from reference.one_thread import one_thread
 from reference.worlds import run_world
-from reports.by_name import function_named
 from reports.store import read_run, write_run
 from reports.store.io import opened
 from reports.store.keys import code_version, hash_of, sources_hash

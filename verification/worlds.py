@@ -16,10 +16,12 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +36,7 @@ from iapb.simulation import INTERRUPTED
 from reference import Floats
 from reference.complementarity.solvers import SOLVERS
 from reference.datasets import StoredProblem
+from reference.mujoco import MuJoCo
 from reference.worlds import WORLDS, run_world
 from verification.complementarity.agreement import compare_cases
 from verification.complementarity.of_runs import impacts_of_run, problems_of_run
@@ -43,7 +46,7 @@ from verification.table import Row, Table, table_from
 
 Progress = Callable[[str, int, int], None]
 Ran = tuple[Run, float]  # a run, and the processor time per step [s] without set-up
-Series = dict[str, Floats]  # quantities over time, by their column
+Series = dict[str, Any]  # arrays of quantities over time, by their column; None where a run does not record them
 
 INSTANTS = 1000  # largest number of instants at which worlds are compared
 QUESTION = (
@@ -55,11 +58,15 @@ _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the t
 
 
 def default_worlds(scene: Scene) -> tuple[str, ...]:
-    """Return the default worlds of a scene: those with friction only if it has friction, CBuc only if it has gains."""
+    """Return the default worlds of a scene.
+
+    Those with friction only if it has friction, CBuc only if it has gains, MuJoCo if installed and it ignores nothing.
+    """
     rough = scene.largest_friction > 0.0
     coupled = scene.hand is not None and scene.couplings.unilateral is not None
     return ("IAPB", "PB", *(["IAPB-friction"] if rough else []), "ideal", *(["ideal-friction"] if rough else []),
-            *(["CBuc"] if coupled else []))
+            *(["CBuc"] if coupled else []),
+            *(["mujoco"] if find_spec("mujoco") and not MuJoCo().ignored(scene) else []))
 
 
 def compare_worlds(
@@ -71,8 +78,9 @@ def compare_worlds(
     Parameters
     ----------
     scene : a validated scene, the path of a scene file, or the name of a scene that comes with the project
-    worlds : names of `reference.worlds.WORLDS`; default: IAPB, PB and ideal; if the scene has friction, also
-        IAPB-friction and ideal-friction; if the scene gives gains of the unilateral coupler, also CBuc
+    worlds : names of worlds as `iapb.worlds.find_world` takes them; default: IAPB, PB and ideal; if the scene has
+        friction, also IAPB-friction and ideal-friction; if the scene gives gains of the unilateral coupler, also CBuc;
+        mujoco if it is installed and its model lacks nothing that the scene has
     against : the reference world of the comparison; default: ideal, or ideal-friction if the scene has friction
     impacts : largest number of impacts, spread over the motion, for all solvers; 0 for none
     progress : called as progress(stage, done, total)
@@ -111,8 +119,8 @@ def compare_worlds(
             f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. "
             f"Impulse: {impulse}. Lost: start and work done, minus the end. The time is the processor's, without "
             "set-up.", timed=("time per step", "times the fastest")),
-        "over time": table_from({"world": name, **dict(zip(found, map(float, row), strict=True))}
-                                for name, found in series.items() for row in zip(*found.values(), strict=True)),
+        "over time": table_from({"world": name, **dict(zip(found, row, strict=True))}
+                                for name, found in series.items() for row in _rows_of(found)),
     }  # fmt: skip
     fit = len(runs) - len(unfit)
     said = f"{fit} of {len(runs)} worlds ran to the end of {scene.duration:g} s and are to be trusted"
@@ -137,8 +145,8 @@ def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> 
         wanted = "ideal-friction" if scene.largest_friction > 0.0 else "ideal"
         against = wanted if worlds is None or wanted in names else "ideal" if "ideal" in names else wanted
     for argument, name in [*(("worlds", name) for name in names), ("against", against)]:
-        if name not in WORLDS:
-            raise ArgumentError(argument, name, one_of(name, WORLDS))
+        if name not in WORLDS and ":" not in name:
+            raise ArgumentError(argument, name, f"{one_of(name, WORLDS)}, or your engine as module:engine")
     return (*names, *([against] if against not in names else [])), against
 
 
@@ -166,18 +174,29 @@ def _series(mechanism: Mechanism, run: Run, reference: Run) -> Series:
     q, v = reference.q[at], reference.v[at]
     mass, whole = mechanism.mass_matrices(q), float(mechanism.arrays.mass.sum())
     moved = np.array([mechanism.difference(*pair) for pair in zip(q, run.q[at], strict=True)])
-    given = _given(run)[at] - _given(reference)[at]
-    answer = np.linalg.solve(mass, given[:, :, None])[:, :, 0]
-    forms = {"configuration": np.einsum("ki,kij,kj->k", moved, mass, moved) / whole,
-             "velocity": np.einsum("ki,kij,kj->k", run.v[at] - v, mass, run.v[at] - v) / whole,
-             "impulse": np.einsum("ki,ki->k", given, answer) * whole}
+    forms: dict[str, Floats | None] = {
+        "configuration": np.einsum("ki,kij,kj->k", moved, mass, moved) / whole,
+        "velocity": np.einsum("ki,kij,kj->k", run.v[at] - v, mass, run.v[at] - v) / whole,
+        "impulse": None}
+    if run.records_contacts and reference.records_contacts:
+        given = _given(run)[at] - _given(reference)[at]
+        answer = np.linalg.solve(mass, given[:, :, None])[:, :, 0]
+        forms["impulse"] = np.einsum("ki,ki->k", given, answer) * whole
     depth, steps = np.zeros(run.steps + 1), np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
     np.maximum.at(depth, steps + 1, -run.contacts.gap)
     since = np.minimum(np.concatenate([[0], at[:-1] + 1]), run.steps)  # the deepest since the previous instant
     return {"time [s]": run.time[at],
-            **{f"{name} [{_UNITS[name]}]": np.sqrt(np.maximum(form, 0.0)) for name, form in forms.items()},
+            **{f"{name} [{_UNITS[name]}]": None if form is None else np.sqrt(np.maximum(form, 0.0))
+               for name, form in forms.items()},
             "energy [J]": run.energy["kinetic"][at] + run.energy["potential"][at],
-            "penetration [m]": np.maximum.reduceat(depth, since)}
+            "penetration [m]": np.maximum.reduceat(depth, since) if run.records_contacts else None}
+
+
+def _rows_of(found: Series) -> Iterator[tuple[float | None, ...]]:
+    """Yield the values at each instant."""
+    count = len(found["time [s]"])
+    columns = ([None] * count if values is None else values.tolist() for values in found.values())
+    yield from zip(*columns, strict=True)
 
 
 def _given(run: Run) -> Floats:
@@ -188,20 +207,24 @@ def _given(run: Run) -> Floats:
 def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
     """Return the row of a world; `apart` has its distances, None for the reference world."""
     run, seconds = ran
-    far = {f"{key}, {which} [{unit}]": None if apart is None else _sizes(apart[f"{key} [{unit}]"])[which]
-           for key, unit in _UNITS.items() for which in ("rms", "most", "end")}
+    far: dict[str, float | None] = {}
+    for key, unit in _UNITS.items():
+        values = None if apart is None else apart[f"{key} [{unit}]"]
+        for which in ("rms", "most", "end"):
+            far[f"{key}, {which} [{unit}]"] = None if values is None else _sizes(values)[which]
     books: dict[str, float | None] = dict.fromkeys(
         ("work done [J]", "energy lost [J]", "most above start and work [J]"))
     if run.coupling != "unilateral":  # that coupler moves the tool at times, so there is no energy balance
-        work = np.concatenate([[0.0], run.energy["hand_work"] + run.energy["coupling_work"]])
+        work = np.concatenate([[0.0], run.energy["hand_work"] + run.energy.get("coupling_work", 0.0)])
         total = run.energy["kinetic"] + run.energy["potential"]
         above = total - total[0] - work
         books = dict(zip(books, (float(work[-1]), 0.0 - float(above[-1]), float(above.max())), strict=True))
+    touching = run.records_contacts
     return {"world": name, "law": run.law, "ignores": ", ".join(ignored_fields(run.effects)) or None,
             "simulated until [s]": float(run.time[-1]), **far,
             "kinetic energy at the end [J]": float(run.energy["kinetic"][-1]), **books,
-            "deepest overlap [mm]": 1e3 * float(max(0.0, -run.contacts.gap.min(initial=0.0))),
-            "impacts": len(run.impacts.step), "time per step [µs]": 1e6 * seconds,
+            "deepest overlap [mm]": 1e3 * max(0.0, -float(run.contacts.gap.min(initial=0.0))) if touching else None,
+            "impacts": len(run.impacts.step) if touching else None, "time per step [µs]": 1e6 * seconds,
             "times the fastest": seconds / fastest}
 
 
@@ -214,6 +237,9 @@ def _unfit(scene: Scene, run: Run) -> str:
     """Return why a run is unfit for the comparison; empty if it is complete and trustworthy."""
     if not run.complete or run.steps < scene.steps:
         return f"stopped after {run.time[-1]:g} s" + (f": {run.stopped}" if run.stopped else "")
+    ignored = () if run.records_contacts else ignored_fields(run.effects)
+    if ignored:  # another engine simulated another scene
+        return f"ignores {', '.join(ignored)}"
     return f"not to be trusted: {'; '.join(run.distrust)}" if run.distrust else ""
 
 

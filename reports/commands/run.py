@@ -99,8 +99,9 @@ def run_as_json(run: Run) -> dict[str, Any]:
     return {
         "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling,
         "steps": run.steps_done, "every": run.every, "dt": run.dt,
-        "complete": run.complete, "stopped": run.stopped, "collisions": len(run.impacts.step),
-        "deepest_penetration": deepest(run),
+        "complete": run.complete, "stopped": run.stopped,
+        "collisions": len(run.impacts.step) if run.records_contacts else None,
+        "deepest_penetration": deepest(run) if run.records_contacts else None,
         "end": dict(zip(run.coordinate_names, run.q[-1].tolist(), strict=True)),
         "ignores": ignored_fields(run.effects), "remarks": run.remarks, "distrust": run.distrust,
     }  # fmt: skip
@@ -126,7 +127,7 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
         most = max(int(block.max()) for block in blocks(impacts.rows))
         yield (f"{counted(len(impacts.step), 'impact')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
               f"{counted(most, 'contact')} at once; {lost:.4g} J were lost in them.")
-    else:
+    elif run.records_contacts:
         yield "No contact got an impulse."
     if len(run.contacts.gap):
         yield f"Deepest penetration {deepest(run) * 1e3:.4g} mm."

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from iapb.by_name import function_named
 from iapb.compiling import compiling_told, to_stderr
-from reports.by_name import function_named
 from reports.campaign import KEPT_PER_LAW, Campaign
 from reports.counterexamples import ENGINE, CampaignRequest, recheck_command
 from reports.counterexamples import recheck as judge_again
@@ -19,8 +19,10 @@ from verification.laws import CONTRACTS
 from verification.laws.bounds import LawCount
 from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
+from verification.laws.worlds import judge_world
 
 ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M) in tests of the engine, of any other resolver
+WORLD_SCENES = 100  # random scenes of --world
 LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json
 _SHOWN = 20  # counterexamples listed; all are in their folder
 
@@ -45,9 +47,14 @@ def verify(
     recheck: Annotated[Path | None, typer.Option(help="Judge a stored counterexample again.")] = None,
     allow_code: Annotated[bool, typer.Option(
         "--allow-code", help="With --recheck: import and call the resolver named in the file.")] = False,
+    world: Annotated[str | None, typer.Option(
+        help="Put a world to the laws of trajectories on random scenes instead: mujoco, or your engine as "
+             "module:engine.")] = None,
     json_: Json = False,
 ) -> Answer:
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
+    if world is not None:
+        return _of_world(world, seed)
     if (contract != "equality" or laws) and (full or recheck is not None):
         raise typer.BadParameter("not with --full or --recheck", param_hint="--contract, --laws")
     if recheck is not None:
@@ -118,3 +125,19 @@ def _rechecked(path: Path, allow_code: bool) -> Answer:
     return Answer({"laws": laws, "passed": passed},
                   [f"  {_kept(residual.passed)} {law}: {residual.words}"
                    for law, residual in judged], int(not passed))
+
+
+def _of_world(world: str, seed: int) -> Answer:
+    """Put a world to the laws of trajectories on random scenes."""
+    with stage_progress() as progress:
+        counts, left_out = judge_world(world, WORLD_SCENES, seed, partial(progress, "random scenes"))
+    judged = WORLD_SCENES - left_out
+    ignoring = f"; {left_out} others have something that it ignores" if left_out else ""
+    lines = [f"{world} on {judged} random scenes{ignoring}."]
+    for count in counts:
+        mark = "BROKEN" if count.failures else "kept  "
+        worst = f"; worst {count.worst.words}" if count.worst else ""
+        lines.append(f"  {mark} {count.law}: {count.failures:,} of {count.checked:,} break it{worst}")
+    passed = judged > 0 and not any(count.failures for count in counts)
+    facts = {"world": world, "scenes": judged, "left_out": left_out, "passed": passed, "laws": counts}
+    return Answer(facts, lines, int(not passed))

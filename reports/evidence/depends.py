@@ -20,6 +20,7 @@ FOLDERS: dict[str, tuple[str, ...]] = {
 }
 # stage -> packages that it compares with, or leaves out where they are absent
 PACKAGES: dict[str, tuple[str, ...]] = {
+    "engines": ("mujoco",),
     "mechanics": ("pin", "coal"),
     "accuracy": ("daqp", "quantecon"),
     "complementarity": ("cvxpy", "clarabel", "osqp", "scs", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon",

@@ -31,6 +31,7 @@ TOPICS: dict[str, str] = {
     "scene-ledger": "verification.scenes.ledger:scene_ledger",
     "stability": "verification.stability.topic:contact_stability",
     "complementarity": "verification.complementarity.topic:TOPIC",
+    "engines": "verification.engines:engines",
     "haptic-rate": "verification.haptic_rate:TOPIC",
     "survival": "reports.evidence.survival:compute",
     "exact-energy": "reports.evidence.exact_energy:TOPIC",  # last: it certifies the runs of all others

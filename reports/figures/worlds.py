@@ -30,6 +30,7 @@ def worlds(table: Table, series: Table) -> Drawn:
     with Plot("worlds", (9.6, 5.4), shape=(2, 3)) as plot:
         for axes, (key, (title, factor)) in zip(plot.each, _PANELS.items(), strict=False):
             shown = [name for name in names if key not in _DISTANCES or name != against]
+            shown = [name for name in shown if None not in series.where(world=name).column(key)]
             _curves(axes, series, key, factor, {name: looks[name] for name in shown})
             axes.set(title=title, xlabel="time [s]")
         bars, spent = plot.each[5], dict(zip(table.column("world"), table.column("time per step"), strict=True))

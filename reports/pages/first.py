@@ -31,7 +31,7 @@ COUNTED = dict(zip(KINDS, (
     "hold{s} for some quantities and fail{s} for others", "fail{s}", "cannot be decided here", "not computed",
 ), strict=True))
 # Topics whose failures are listed first: energy gains and wrong motions, then differences, then slow methods.
-GRAVEST = ("exact-energy", "hard-cases", "scene-ledger", "complementarity", "stability", "mechanics")
+GRAVEST = ("exact-energy", "hard-cases", "scene-ledger", "engines", "complementarity", "stability", "mechanics")
 NEXT = ("Read “The idea”: one formula, five minutes", "idea")  # the one next step, at the top
 LATER = (("which method for your time budget", "accuracy"), ("tests for your own solver", "properties"),
          ("all data and commands", "manifest"))

@@ -57,6 +57,7 @@ SECTIONS: tuple[Section, ...] = (
     _topic(CHECKS, "complementarity", "Against complementarity"),
     Section(CHECKS, "hard-cases", "Hard cases", "hard_cases", ("hard cases",)),
     _topic(CHECKS, "stability", "Stability of contact"),
+    _topic(CHECKS, "engines", "Other engines"),
     Section(TIME, "accuracy", "Accuracy against time", "", ("accuracy",)),
     _topic(TIME, "haptic-rate", "The haptic rate"),
     Section(TIME, "effects", "Effects", "effects", ("effects",)),

@@ -26,7 +26,7 @@ Tables = dict[str, Table]
 
 def _races(ratio: float) -> Table:
     return RACES.table_of([
-        {"scene": "peg in the corner", "MuJoCo's form": "box", "MuJoCo's solver": "Newton", "iapb's contacts": 4,
+        {"scene": "peg in the corner", "MuJoCo's solver": "Newton", "iapb's contacts": 4,
          "MuJoCo's contacts": 8, "MuJoCo's step [µs]": 1.0 / ratio, "ratio": ratio, "quartiles": "", "target": 0.1}
     ])  # fmt: skip
 

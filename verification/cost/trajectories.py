@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -28,8 +29,9 @@ from scipy.spatial.transform import Rotation
 from iapb.run import Run
 from iapb.scene import Scene, load_scene
 from iapb.scene.mechanism import mechanism_of
-from iapb.simulation import Simulation
+from iapb.simulation import Simulation, require_complete
 from reference import Floats
+from reference.mujoco import MuJoCo
 from reference.one_thread import one_thread
 from reference.scene_events import scene_truth
 from reference.worlds import find_world
@@ -238,9 +240,18 @@ def _our_world(name: str) -> World:
     return run
 
 
+def _mujoco(scene: Scene) -> tuple[Run, float]:
+    """Run MuJoCo on the scene with its restitution and its own contact forces."""
+    run = MuJoCo().run(scene.with_values({"contact": {"restitution": scene.contact.restitution}}))
+    require_complete(run)
+    return run, float(run.chunk_seconds.sum())
+
+
 COMPILED = ("IAPB", "PB")
 # To add a world, add a line here.
 WORLDS: dict[str, World] = {**{name: _our_world(name) for name in COMPILED}, IDEAL: _our_world("ideal")}
+if find_spec("mujoco"):
+    WORLDS["MuJoCo"] = _mujoco
 
 
 def over_steps(scene: Scene, world: World, judge: Judge, steps: Sequence[float], longest: float) -> list[Record]:

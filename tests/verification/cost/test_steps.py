@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.system import System
+from reference.mujoco import joint_places, set_state
 from verification.check import Study
 from verification.cost import growth, steps
 from verification.cost.accuracy import BUDGET_ROWS, Stopped
@@ -19,18 +20,15 @@ from verification.table import table_from
 @pytest.mark.parametrize("name", RESTING)
 def test_masses_are_the_same(name: str) -> None:
     mujoco = pytest.importorskip("mujoco")
-    scene = RESTING[name]
-    system = System(scene.ours())
-    for form in scene.forms:
-        model = scene.model(form, "Newton")
-        data = mujoco.MjData(model)
-        if scene.pose:
-            data.qpos[:] = scene.pose
-        mujoco.mj_forward(model, data)
-        theirs = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, theirs) if mujoco.__version__ >= "4" else mujoco.mj_fullM(model, theirs, data.qM)
-        np.testing.assert_allclose(theirs, system.make_state().mass_matrix, rtol=1e-9, atol=1e-12)
-        assert model.opt.timestep == system.dt
+    theirs = steps.TheirLoop(RESTING[name], "Newton", 1)
+    system = System(theirs.scene)
+    data = mujoco.MjData(theirs.model)
+    set_state(joint_places(theirs.scene, theirs.model), data, *system.start)
+    mujoco.mj_forward(theirs.model, data)
+    mass = np.zeros((theirs.model.nv, theirs.model.nv))
+    mujoco.mj_fullM(theirs.model, data, mass)
+    np.testing.assert_allclose(mass, system.make_state().mass_matrix, rtol=1e-9, atol=1e-12)
+    assert theirs.model.opt.timestep == system.dt
 
 
 @pytest.mark.parametrize("name", ["peg in the corner", "free box on a plane"])
@@ -47,8 +45,7 @@ def test_our_scene_rests_and_carries_the_load(name: str) -> None:
 def test_a_race_states_contacts_of_both_and_keeps_every_solver() -> None:
     pytest.importorskip("mujoco")
     races = list(steps.race(Study(), "peg in the corner", 32))
-    assert {(row["MuJoCo's form"], row["MuJoCo's contacts"]) for row in races} == {
-        ("box", 8.0), ("a ball at each corner", 4.0)}  # fmt: skip
+    assert {row["MuJoCo's contacts"] for row in races} == {8.0}  # at both ends of each edge
     assert {row["MuJoCo's solver"] for row in races} == set(steps.SOLVERS)
     assert {row["iapb's contacts"] for row in races} == {4.0} and max(row["MuJoCo's drift"] for row in races) < 1e-6
 

@@ -1,4 +1,4 @@
-"""Import user functions by name, ``package.module:function``."""
+"""Import functions and objects of a user by name, ``package.module:function``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,15 @@ from iapb.names import nearest
 
 
 def function_named(argument: str, name: str, form: str = "package.module:function") -> Callable[..., Any]:
-    """Import a function, also from the working directory; raise ArgumentError if that fails.
+    """Import a function like `object_named`."""
+    function: Callable[..., Any] = object_named(argument, name, form)
+    if not callable(function):
+        raise ArgumentError(argument, name, "something that can be called")
+    return function
+
+
+def object_named(argument: str, name: str, form: str) -> Any:
+    """Import an object, also from the working directory; raise ArgumentError if that fails.
 
     argument : the command-line option that the name was given for; form : the expected form of the name
     """
@@ -30,8 +38,5 @@ def function_named(argument: str, name: str, form: str = "package.module:functio
     if not hasattr(home, attribute):
         near = nearest(attribute, [word for word in dir(home) if not word.startswith("_")])
         guess = f"; did you mean {near}?" if near else ""
-        raise ArgumentError(argument, name, f"a function of the module {module}, which has no {attribute}{guess}")
-    function: Callable[..., Any] = getattr(home, attribute)
-    if not callable(function):
-        raise ArgumentError(argument, name, "something that can be called")
-    return function
+        raise ArgumentError(argument, name, f"a name of the module {module}, which has no {attribute}{guess}")
+    return getattr(home, attribute)

@@ -1,0 +1,79 @@
+"""Topic "engines": the project's scenes in MuJoCo and in IAPB, beside rigid contact.
+
+Every scene keeps its bodies, walls, friction and restitution. It gets the default contact, and the hand holds the tool
+itself: what MuJoCo has nothing like is left out, so that all worlds simulate the same scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+
+import numpy as np
+
+from iapb.errors import installing
+from iapb.scene import scene_names
+from verification.check import Check, Study, Topic
+from verification.finding import Part, verdict_of_trials
+from verification.laws.worlds import any_scene
+from verification.table import Row, Table
+from verification.worlds import compare_worlds
+
+LONGEST = {"quick": 0.3, "full": 2.0}  # [s] simulated time of a scene
+SAME = 1e-3  # [mm] a difference that does not count
+
+
+def _row(study: Study, name: str) -> Row:
+    """Return how far both worlds are from rigid contact, and what they make of energy."""
+    given = study.scene(name)
+    duration = min(given.duration, LONGEST[study.depth])
+    scene = any_scene(given.resolved() | {"duration": duration})
+    table = compare_worlds(scene, ["IAPB", "mujoco"], impacts=0).tables["worlds"]
+    ours, theirs = (table.where(world=world).records()[0] for world in ("IAPB", "mujoco"))
+    return {
+        "scene": name,
+        "simulated [s]": duration,
+        "IAPB apart [mm]": 1e3 * ours["configuration, rms"],
+        "MuJoCo apart [mm]": 1e3 * theirs["configuration, rms"],
+        "IAPB above start and work [J]": ours["most above start and work"],
+        "MuJoCo above start and work [J]": theirs["most above start and work"],
+    }
+
+
+def _is_as_near(row: Row) -> bool:
+    """Whether IAPB is at least as near to rigid contact as MuJoCo."""
+    return bool(row["IAPB apart"] <= row["MuJoCo apart"] + SAME)
+
+
+def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
+    table = tables[SCENES.key]
+    if not table.rows:
+        return f"MuJoCo is not installed: {installing('reference')}."
+    medians = [float(np.median(table.column(f"{name} apart"))) for name in ("IAPB", "MuJoCo")]
+    return (
+        f"In the median of {len(table.rows)} scenes IAPB is {medians[0]:.2g} mm from rigid contact, and MuJoCo "
+        f"{medians[1]:.2g} mm."
+    )
+
+
+SCENES = Check(
+    key="scenes",
+    question="IAPB is at least as near to rigid contact as MuJoCo.",
+    cases=lambda study: scene_names() if find_spec("mujoco") else (),
+    row=_row,
+    holds=_is_as_near,
+    rule=verdict_of_trials,
+    digits=3,
+    note="Apart: distance from the ideal world, in a scene with friction from ideal-friction; root mean square over "
+    "mass and time. Above start and work: the largest rise of kinetic plus potential energy above the start and the "
+    "work of the hand.",
+)
+engines = Topic(
+    key="engines",
+    title="Other engines",
+    question="Every scene of the project is simulated in IAPB, in MuJoCo and with rigid contact, at the scene's own "
+    "step. The scenes have the default contact, and the hand holds the tool itself, so that all worlds simulate the "
+    "same. MuJoCo's settings follow from one rule (docs/engines.md).",
+    checks=(SCENES,),
+    says=_answer,
+)
