@@ -50,7 +50,7 @@ reproduce: setup ## regenerate every figure, table and claim into out/report.htm
 	@$(BIN)/iapb reproduce $(if $(FULL),--full)
 
 .PHONY: verify
-verify: setup ## the laws at 1,000,000 impacts and 7,000 trajectories; half an hour of a core, can be stopped and resumed
+verify: setup ## the laws at 1,000,000 impacts and 7,000 trajectories; half an hour of a core; Ctrl-C prints what was found
 	@$(BIN)/iapb verify --full --workers $(PYTEST_WORKERS)
 
 .PHONY: portable

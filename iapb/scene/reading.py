@@ -5,7 +5,7 @@ from __future__ import annotations
 from os import fspath
 from os.path import exists, isfile
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -13,8 +13,10 @@ from iapb.errors import ArgumentError, Mistake, SceneError, shown
 from iapb.names import nearest, one_of
 from iapb.scene.document import MAX_CHARACTERS, Document
 from iapb.scene.model import Scene, scene_kind
-from iapb.scene.parts import mistakes_of
+from iapb.scene.parts import ScenePart, mistakes_of
 from iapb.scene.robots import with_robots
+
+Part = TypeVar("Part", bound=ScenePart)
 
 
 def scene_folder() -> Path:
@@ -30,17 +32,18 @@ def scene_folder() -> Path:
     return installed if installed.is_dir() else package.parent / "scenes"
 
 
-def scene_names() -> tuple[str, ...]:
-    """Return the names of the scenes that come with the project, sorted."""
-    return tuple(sorted(path.stem for path in scene_folder().glob("*.yaml")))
+def scene_names(folder: str = "") -> tuple[str, ...]:
+    """Return the names of the scenes that come with the project, sorted; with a folder, of the files in it."""
+    return tuple(sorted(path.stem for path in (scene_folder() / folder).glob("*.yaml")))
 
 
-def find_scene(name: str | Path) -> Path:
+def find_scene(name: str | Path, folder: str = "") -> Path:
     """Return the scene file for `name`, which is a path or the name of a scene of the project.
 
     Parameters
     ----------
     name : path of a file, or a name such as ``peg_corner``
+    folder : of the project's scenes, such as ``sweeps``
 
     Returns
     -------
@@ -58,10 +61,10 @@ def find_scene(name: str | Path) -> Path:
         raise ArgumentError("scene", name, "a path, or the name of a scene") from None
     if isfile(path):  # a path that is too long is no file; Path.is_file raises OSError
         return path
-    ours = scene_folder() / f"{path.stem}.yaml"
+    ours = scene_folder() / folder / f"{path.stem}.yaml"
     if str(name) in (path.stem, path.name) and isfile(ours):
         return ours
-    said, near = one_of(path.stem, scene_names(), "a file, or one of: "), ""
+    said, near = one_of(path.stem, scene_names(folder), "a file, or one of: "), ""
     if path.suffix:  # a file was meant
         near = nearest(path.name, (file.name for file in path.parent.glob(f"*{path.suffix}")))
     raise ArgumentError("scene", str(name), f"{said.partition('; did')[0]}; did you mean {path.parent / near}?" if near
@@ -87,6 +90,11 @@ def load_scene(path: str | Path) -> Scene:
     SceneError
         the file is not a valid scene; the error lists all mistakes.
     """
+    return scene_from_text(read_text(path), str(path))
+
+
+def read_text(path: str | Path) -> str:
+    """Return the text of a scene file or a study; it raises the errors of `load_scene`."""
     try:
         if exists(path := fspath(path)) and not isfile(path):  # a number would be an open file
             raise ValueError("no regular file")  # a pipe would be waited for
@@ -101,7 +109,7 @@ def load_scene(path: str | Path) -> Scene:
         line = content.count(b"\n", 0, failure.start) + 1
         wrong = shown(content[failure.start : failure.end])
         raise SceneError([Mistake(str(path), line, 1, "(file)", wrong, "text in UTF-8")]) from failure
-    return scene_from_text(text, str(path))
+    return text
 
 
 def scene_from_text(text: str, file: str = "(text)") -> Scene:
@@ -114,18 +122,30 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     """
     document = Document(text, file)
     given, mistakes = with_robots(document)
-    try:
-        scene = scene_kind(given).model_validate(given)
-    except ValidationError as failure:
-        mistakes += mistakes_of(failure, document.file, document.value, document.place)
-    mistakes += document.mistakes
-    if mistakes:
-        raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)))
+    scene = checked(scene_kind(given), given, document, mistakes)
     if given is document.value:
         scene._source_text, scene._file = text, file if file != "(text)" else ""
     else:
         scene._about = f"{scene.name} with its robots as bodies"
     return scene
+
+
+def checked(kind: type[Part], given: Any, document: Document, mistakes: list[Mistake], what: str = "scene") -> Part:
+    """Return the values `given` of a document as a part.
+
+    Raises
+    ------
+    SceneError
+        the values are wrong, or there are `mistakes` already; `what` names the kind of file.
+    """
+    try:
+        part = kind.model_validate(given)
+    except ValidationError as failure:
+        mistakes = mistakes + mistakes_of(failure, document.file, document.value, document.place)
+    mistakes = mistakes + document.mistakes
+    if mistakes:
+        raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)), what)
+    return part
 
 
 def scene_from_values(given: Any) -> Scene:

@@ -1,17 +1,15 @@
-"""`iapb inspect FILE`: describe a run file, or a counterexample to a law, from its contents alone."""
+"""`iapb inspect FILE`: describe a run file from its contents alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
 
 from iapb.run import Run
+from reference.hdf5 import try_file
 from reports.commands.run import describe, run_as_json
-from reports.counterexamples import read_counterexample, recheck_command
 from reports.show import Answer, Json
 from reports.store.runs import RunEntry, opened_run, read_provenance
 from verification.table import Table, titled
@@ -27,8 +25,7 @@ def inspect(
     json_: Json = False,
 ) -> Answer:
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
-    if broken := read_counterexample(file):
-        return Answer(broken, list(_broken_law(broken, file)))
+    try_file(file)
     with opened_run(file) as (run, entry):
         return _run(run, entry, read_provenance(file), impacts)
 
@@ -56,23 +53,3 @@ def _run(run: Run, entry: RunEntry, provenance: dict[str, str], impacts: int) ->
     return Answer(run_as_json(run) | {
         "impacts": listed, "energy": energy, "effects": run.effects, "provenance": provenance,
         "run_key": entry.run_key, "content_hash": entry.content_hash}, lines)
-
-
-def _broken_law(broken: dict[str, Any], file: Path) -> Iterator[str]:
-    """Yield which law was broken, by which resolver, how it was found, and for an impact a test to paste."""
-    request, case = broken["request"], broken["case"]
-    yield f"{broken['resolver']} breaks a law, {broken['law']}{': ' + broken['statement'] if broken['test'] else ''}."
-    yield f"Residual {broken['value']:.6g}, allowed {broken['tolerance']:.6g}."
-    yield (f"Found as case {broken['index']} of the part {broken['part']!r}, seed {request.seed}. "
-           f"Judged again by: {recheck_command(file, request.resolver)}")
-    if not broken["test"]:
-        return
-    if broken["complaint"]:
-        yield f"The resolver: {broken['complaint']}."
-    yield f"{case.contacts} rows on {case.coordinates} coordinates ({case.family or 'no family'}), in bare numbers."
-    given = {"mass matrix M": case.mass_matrix, "contact Jacobian J": case.contact_jacobian,
-             "velocity before": case.velocity, "restitution": case.given_restitution(),
-             "velocity after": broken["velocity_after"]}  # fmt: skip
-    for name, values in given.items():
-        yield f"\n{name}:\n{np.array2string(np.asarray(values), precision=6, prefix='  ', max_line_width=110)}"
-    yield f"\nAs a test, every digit:\n\n{broken['test']}\n"

@@ -1,30 +1,43 @@
-"""`iapb verify`: test an impact resolver; `--full`: with the full campaign."""
+"""`iapb verify`: test an impact resolver; `--full`: on a million impacts."""
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from iapb.by_name import function_named
-from iapb.compiling import compiling_told, to_stderr
-from reports.campaign import KEPT_PER_LAW, Campaign
-from reports.counterexamples import ENGINE, CampaignRequest, recheck_command
-from reports.counterexamples import recheck as judge_again
 from reports.show import Answer, Json, stage_progress
+from reports.store import write_run
+from reports.workers import cores, executor
 from verification import check_passivity
 from verification.laws import CONTRACTS
 from verification.laws.bounds import LawCount
-from verification.laws.campaign import IMPACTS, OF_ONE_CALL, ONE_IN, PARTS, plan
+from verification.laws.full import (
+    IMPACTS,
+    OF_ONE_CALL,
+    ONE_IN,
+    PARTS,
+    Batch,
+    Found,
+    Outcome,
+    Subject,
+    as_pytest,
+    judge_batch,
+    plan,
+    subject_of,
+    summed,
+)
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
 from verification.laws.worlds import judge_world
 
-ENGINE_CONDITION, ANY_CONDITION = 1e10, 1e8  # largest κ(M) in tests of the engine, of any other resolver
+ENGINE = "iapb:resolve_impact"
+BROKEN_RUNS = Path("out/runs")  # folder of the scenes that break a law of --full
 WORLD_SCENES = 100  # random scenes of --world
 LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")  # with --json
-_SHOWN = 20  # counterexamples listed; all are in their folder
 
 
 def verify(
@@ -39,14 +52,9 @@ def verify(
     = None,
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random impacts.")] = 0,
     unequal: Annotated[bool, typer.Option("--unequal", help="Also pass one restitution per contact.")] = False,
-    full: Annotated[bool, typer.Option("--full", help="A million impacts and thousands of trajectories; a "
-                                       "stopped campaign continues.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="A million impacts and thousands of trajectories.")] = False,
     trajectories: Annotated[int, typer.Option(min=0, help="Random scenes of --full.")] = 5000,
-    workers: Annotated[int, typer.Option(min=1, max=512, help="Processes of --full.")] = 1,
-    out: Annotated[Path, typer.Option(help="Folder of the batches of --full.")] = Path("out/verify"),
-    recheck: Annotated[Path | None, typer.Option(help="Judge a stored counterexample again.")] = None,
-    allow_code: Annotated[bool, typer.Option(
-        "--allow-code", help="With --recheck: import and call the resolver named in the file.")] = False,
+    workers: Annotated[int, typer.Option(min=0, max=512, help="Processes of --full; 0: one per core.")] = 0,
     world: Annotated[str | None, typer.Option(
         help="Put a world to the laws of trajectories on random scenes instead: mujoco, or your engine as "
              "module:engine.")] = None,
@@ -55,12 +63,10 @@ def verify(
     """Test an impact resolver against every law; print the verdict, the worst case and a shrunk counterexample."""
     if world is not None:
         return _of_world(world, seed)
-    if (contract != "equality" or laws) and (full or recheck is not None):
-        raise typer.BadParameter("not with --full or --recheck", param_hint="--contract, --laws")
-    if recheck is not None:
-        return _rechecked(recheck, allow_code)
+    if full and (contract != "equality" or laws):
+        raise typer.BadParameter("not with --full", param_hint="--contract, --laws")
     if full:
-        return _campaign(resolver, impacts or 1_000_000, trajectories, seed, workers, out)
+        return _full(resolver, impacts or 1_000_000, trajectories, seed, workers or cores())
     tested = function_named("--resolver", resolver)
     named = [name for given in laws or () for name in given.split(",") if name]
     with stage_progress() as progress:
@@ -73,58 +79,77 @@ def verify(
     return Answer(facts, [str(report)], 0 if report.passed else 1)
 
 
-def _campaign(resolver: str, impacts: int, trajectories: int, seed: int, workers: int, out: Path) -> Answer:
-    """Compute the missing batches and list every law. A resolver of somebody else's is tested on impacts only."""
-    ours = resolver == ENGINE
-    bounds, condition = ("FACTORED", ENGINE_CONDITION) if ours else ("KIT", ANY_CONDITION)
-    request = CampaignRequest(resolver, bounds, condition, impacts, trajectories, seed, workers)
-    request.subject()  # raises here, not in a worker, if the name cannot be imported
-    batches, campaign = plan(impacts, trajectories, PARTS if ours else (IMPACTS,)), Campaign(out, request)
-    there = sum(campaign.path_of(batch).is_file() for batch in batches)
-    lines, stopped = [f"{len(batches)} batches in {campaign.folder}, {there} of them done before."], False
+def _full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int) -> Answer:
+    """Judge many cases in worker processes, and list every law; Ctrl-C lists what was judged until then.
+
+    A resolver of somebody else's is tested on impacts only.
+    """
+    subject = subject_of(function_named("--resolver", resolver), seed)
+    batches = plan(impacts, trajectories, PARTS if resolver == ENGINE else (IMPACTS,))
+    total: Counter[str] = Counter()
+    done: Counter[str] = Counter()
+    for batch in batches:
+        total[batch.part] += batch.count
+    judged: list[Outcome] = []
+    stopped = False
     try:
-        with stage_progress() as progress:
-            campaign.run(batches, progress)
+        with stage_progress() as progress, executor(workers) as pool:
+            outcomes = pool.map(partial(_judged, resolver, seed), batches)
+            for batch, outcome in zip(batches, outcomes, strict=True):
+                judged.append(outcome)
+                done[batch.part] += batch.count
+                progress(batch.part, done[batch.part], total[batch.part])
     except KeyboardInterrupt:
         stopped = True
-        lines.append("Stopped; the same command continues. So far:")
-    counts, found, seconds = campaign.counts(batches), campaign.counterexamples(), campaign.seconds(batches)
+    counts, found = summed(judged)
+    lines = [f"{len(judged)} of {len(batches)} batches of cases{', then stopped' if stopped else ''}."]
     for part, laws in counts.items():
-        lines += [f"{part}:", *(f"  {_kept(not one.failures)} {count_in_words(one)}" for one in laws.values())]
-    lines += [f"Of the laws of impacts, {', '.join(OF_ONE_CALL)} are put to every one; each other to one in {ONE_IN}.",
-              f"{seconds / 60.0:.1f} minutes of work in all."]
-    if found:
-        lines.append(f"{len(found):,} files (of one law at most {KEPT_PER_LAW:,}) show what broke a law. Impacts and "
-                     "trajectories are runs, for iapb inspect FILE. Judged again by:")
-    lines += [f"  {recheck_command(path, resolver)}" for path in found[:_SHOWN]]
-    passed = not any(one.failures for laws in counts.values() for one in laws.values())
-    return Answer({"resolver": resolver, "folder": campaign.folder, "batches": len(batches), "found": there,
-                   "seconds": seconds, "counterexamples": found, "passed": passed,
-                   "laws": {part: list(laws.values()) for part, laws in counts.items()}},
-                  lines, 130 if stopped else int(not passed))
+        lines.append(f"{part}:")
+        lines += [_line(count) for count in laws.values()]
+    every = ", ".join(OF_ONE_CALL)
+    lines.append(f"Of the laws of impacts, {every} are put to every one; each other to one in {ONE_IN}.")
+    shown = [_shown(one, subject) for one in found]
+    for one in shown:
+        lines.append(f"\n{one['part']}, case {one['index']}, breaks {one['law']}. As a test:\n\n{one['test']}")
+        if one["run"]:
+            lines.append(f"\nIts run: {one['run']}")
+    facts = {
+        "resolver": resolver,
+        "seed": seed,
+        "batches": len(batches),
+        "judged": len(judged),
+        "passed": not found,
+        "laws": {part: list(laws.values()) for part, laws in counts.items()},
+        "counterexamples": shown,
+    }
+    return Answer(facts, lines, 130 if stopped else int(bool(found)))
 
 
-def _kept(passed: bool) -> str:
-    return "kept  " if passed else "BROKEN"
+def _judged(resolver: str, seed: int, batch: Batch) -> Outcome:
+    """Judge a batch in a worker process, which imports the resolver by its name."""
+    return judge_batch(batch, subject_of(function_named("--resolver", resolver), seed))
 
 
-def count_in_words(count: LawCount) -> str:
-    """Return as text how many of the cases broke a law, and the worst residual as a share of its tolerance."""
-    worst = count.worst
-    nearest = "" if worst is None else f"; worst {worst.words}"
-    return f"{count.law}: {count.failures:,} of {count.checked:,} break it{nearest}"
+def _shown(found: Found, subject: Subject) -> dict[str, Any]:
+    """Return a counterexample with its test; the run of a scene is stored."""
+    run = None
+    if found.run is not None:
+        name = f"{found.part.replace(' ', '_')}-seed{subject.seed}-{found.index}.h5"
+        run = write_run(BROKEN_RUNS / name, found.run, replace=True)
+    return {
+        "part": found.part,
+        "law": found.law,
+        "index": found.index,
+        "test": as_pytest(found, subject),
+        "run": run,
+    }
 
 
-def _rechecked(path: Path, allow_code: bool) -> Answer:
-    """Judge a stored counterexample again, by every law."""
-    with compiling_told(to_stderr):
-        judged = tuple(judge_again(path, allow_code))
-    passed = all(residual.passed for _, residual in judged)
-    laws = [{"law": law, "passed": residual.passed, "value": residual.value, "tolerance": residual.tolerance}
-            for law, residual in judged]
-    return Answer({"laws": laws, "passed": passed},
-                  [f"  {_kept(residual.passed)} {law}: {residual.words}"
-                   for law, residual in judged], int(not passed))
+def _line(count: LawCount) -> str:
+    """Return as text how many of the cases broke a law, and the worst residual with its tolerance."""
+    mark = "BROKEN" if count.failures else "kept  "
+    worst = f"; worst {count.worst.words}" if count.worst else ""
+    return f"  {mark} {count.law}: {count.failures:,} of {count.checked:,} break it{worst}"
 
 
 def _of_world(world: str, seed: int) -> Answer:
@@ -134,10 +159,7 @@ def _of_world(world: str, seed: int) -> Answer:
     judged = WORLD_SCENES - left_out
     ignoring = f"; {left_out} others have something that it ignores" if left_out else ""
     lines = [f"{world} on {judged} random scenes{ignoring}."]
-    for count in counts:
-        mark = "BROKEN" if count.failures else "kept  "
-        worst = f"; worst {count.worst.words}" if count.worst else ""
-        lines.append(f"  {mark} {count.law}: {count.failures:,} of {count.checked:,} break it{worst}")
+    lines += [_line(count) for count in counts]
     passed = judged > 0 and not any(count.failures for count in counts)
     facts = {"world": world, "scenes": judged, "left_out": left_out, "passed": passed, "laws": counts}
     return Answer(facts, lines, int(not passed))

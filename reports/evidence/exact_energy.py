@@ -13,8 +13,8 @@ import numpy as np
 
 from iapb import certify
 from iapb.contact.laws import ENGINE_LAWS
-from reports.batches import cores, processes
 from reports.store.runs import read_run
+from reports.workers import REPORT_WORKERS, executor
 from verification.check import Check, Study, Topic
 from verification.finding import NOT_TESTABLE, Part, attempt, verdict_of_law
 from verification.impacts import ADVERSE_FAMILIES
@@ -61,8 +61,9 @@ def _certify_beside(study: Study, names: Sequence[str]) -> None:
     """Certify the runs in processes; a run that raises there is tried again, and named, without them."""
     if len(names) > FEW:
         rows = partial(_rows, study.run.store.folder)  # type: ignore[attr-defined]
-        found = processes(cores())(partial(attempted, rows), names)
-        study.results.update((name, given) for name, given in found if given is not None)
+        with executor(REPORT_WORKERS) as pool:
+            found = zip(names, pool.map(partial(attempted, rows), names), strict=True)
+            study.results.update((name, given) for name, given in found if given is not None)
 
 
 def _drawn(study: Study, family: str) -> Row:

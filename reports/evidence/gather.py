@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future, as_completed
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -14,7 +14,6 @@ from typing import Any
 
 from iapb.errors import IapbError
 from reference.one_thread import one_thread
-from reports import batches
 from reports.evidence import runs
 from reports.evidence.depends import depends_of
 from reports.evidence.stage import Stage
@@ -26,6 +25,7 @@ from reports.runner import Runner
 from reports.store.io import opened, write_whole
 from reports.store.keys import evidence_version
 from reports.uses import StoredFile
+from reports.workers import REPORT_WORKERS, executor
 from verification import haptic_rate
 from verification.check import Study
 from verification.claims import peg
@@ -59,7 +59,7 @@ CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
 ON_THE_PEG = "claims on the peg"
 FIRST = ("proofs", ON_THE_PEG, "properties", "claims")
 COMPILED_AHEAD = (C19, C22, ACCURACY, RACES, SCALING, BODIES, IMPACT_TIMES)  # checks whose kernels only they call
-PAUSE = 0.2  # [s] between two looks at what the workers say
+BESIDE = "parts that measure no time"
 
 
 def gather(out: Path, depth: str, progress: Progress) -> Evidence:
@@ -137,22 +137,28 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
     ahead = [name for name in missing if not (plans()[name].timed or name == CERTIFIED)]
     if not ahead:
         return
-    with suppress(IapbError), batches.worker_pool(batches.cores()) as pool:
-        running: set[Future[Any]] = {pool.submit(_figure_runs, out)}
+    with suppress(IapbError), executor(REPORT_WORKERS) as pool:
+        jobs: list[Future[Any]] = [pool.submit(_figure_runs, out)]
         for name in ahead:
-            running |= {pool.submit(_slowest_runs, out, depth)} if name == ON_THE_PEG else set()
-            running |= {pool.submit(_fill, stages[name], Runner(out / "runs"), depth, batches.tell_parent)}
-        running.add(pool.submit(_compile_ahead, out, depth))
-        while running:
-            done, running = wait(running, PAUSE, FIRST_COMPLETED)
-            stages |= {stage.name: stage for future in done if isinstance(stage := future.result(), Stage)}
-            while not pool.said.empty():
-                progress(*pool.said.get())
+            if name == ON_THE_PEG:
+                jobs.append(pool.submit(_slowest_runs, out, depth))
+            jobs.append(pool.submit(_fill, stages[name], Runner(out / "runs"), depth, silent))
+        jobs.append(pool.submit(_compile_ahead, out, depth))
+        progress(BESIDE, 0, len(jobs))
+        for done, job in enumerate(as_completed(jobs), 1):
+            stage = job.result()
+            if isinstance(stage, Stage):
+                stages[stage.name] = stage
+            progress(BESIDE, done, len(jobs))
+
+
+def silent(*_: Any) -> None:
+    """Tell no progress, in a worker."""
 
 
 def _figure_runs(out: Path) -> None:
     """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those that fail."""
-    runs.figure_runs(Runner(out / "runs"), partial(batches.tell_parent, FIGURE_RUNS), [])
+    runs.figure_runs(Runner(out / "runs"), silent, [])
 
 
 def _compile_ahead(out: Path, depth: str) -> None:

@@ -166,17 +166,17 @@ def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until
     assert len(calls) == 2 and not list(tmp_path.rglob("*incomplete*")) and not list(tmp_path.rglob("*failed*"))
 
 
-def test_a_stage_computed_in_a_process_is_that_of_this_process_and_tells_its_progress(tmp_path, monkeypatch):
+def test_a_stage_computed_in_a_process_is_that_of_this_process(tmp_path, monkeypatch):
     name, said = "proofs", []
     plan = topics.plans()[name]
     monkeypatch.setattr(gather, "plans", lambda: {name: plan})
     monkeypatch.setattr(gather, "_figure_runs", os.path.exists)  # which simulates nothing
-    monkeypatch.setattr(gather.batches, "cores", lambda: 1)
+    monkeypatch.setattr(gather, "REPORT_WORKERS", 1)
     made = {name: Stage(tmp_path / "tables", name, plan.kind, "quick")}
     gather._compute_beside(made, tmp_path, "quick", lambda *given: said.append(given))
     read = Stage(tmp_path / "tables", name, plan.kind, "quick").fill(Runner(tmp_path / "runs"), pytest.fail)
     assert made[name].records == read.records and {record.name for record in read.records} == set(all_proofs())
-    assert said[0] == (name, 0, len(made[name].records)) and said[-1] == (name, 1, 1)
+    assert said[0] == (gather.BESIDE, 0, 3) and said[-1] == (gather.BESIDE, 3, 3)
 
 
 def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypatch):

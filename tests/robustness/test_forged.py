@@ -164,8 +164,7 @@ def test_a_forged_run_is_refused_by_every_reader_and_shows_no_other_file(name, t
     store.mkdir()
     path = forged(store / "forged.h5", attack)
     write_run(store / "whole.h5", sample_run())
-    for words in (["certify"], ["store", "again"], *([["inspect"]] * (name != "no scene")),
-                  *([["verify", "--recheck"]] * bool(told))):
+    for words in (["certify"], ["store", "again"], *([["inspect"]] * (name != "no scene"))):
         said = refused(*words, path)
         assert said.count("\n") <= 4 and told in said and "password" not in said, said
     assert "1 of 2" in refused("store", "again", store)
@@ -240,7 +239,7 @@ def test_a_pipe_is_refused_and_not_waited_for_and_odd_encodings_are_refused(tmp_
         os.mkfifo(name)
     Path("scene.yaml").write_text(
         "{name: s, dimensions: 3, rate: 100, duration: 1, bodies: [], robots: [{name: a, urdf: arm.urdf}]}")
-    for line in ("inspect pipe.h5", "store check pipe.h5", "store again pipe.h5", "verify --recheck pipe.h5",
+    for line in ("inspect pipe.h5", "store check pipe.h5", "store again pipe.h5",
                  "run scene.yaml", "run pipe.yaml", "sweep pipe.yaml", "report diff pipe.h5 pipe.h5"):
         assert refused(*line.split()).count("\n") <= 3, line
     assert "no regular file" in refused("certify", "pipe.npz")

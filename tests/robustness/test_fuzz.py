@@ -33,7 +33,7 @@ from reports.cli import main
 from reports.commands.inspect import inspect
 from reports.store.io import sealed
 from reports.store.tables import read_table
-from reports.sweeps.study import load_study, points_of, scene_of
+from reports.sweep import load_study
 from tests.robustness.samples import TIMES, fclib_files, result_files
 
 pytestmark = pytest.mark.thorough
@@ -202,9 +202,9 @@ def read_scene(path):
 
 
 def read_study(path):
-    """Read it, find its scene, and spell out its first points."""
-    study = load_study(path)
-    list(islice(points_of(study, str(scene_of(study, path))), STEPS))
+    """Read it and its scene, and spell out its first points."""
+    study, _ = load_study(path)
+    list(islice(study.points(), STEPS))
 
 
 def read_robot(path):
@@ -229,7 +229,7 @@ LINES = (
     "run two_discs --world PB --set duration=0.05 --set contact.restitution=0.5",
     "run peg_corner --rendering scale --set duration=0.05 --set bodies.peg.position=[0.03,-0.01,0]",
     "effects peg_corner --world ideal", "effects arm_obstacles", "inspect run.h5 --impacts 1", "schema",
-    "store check results", "sweep no_study --workers 1", "verify --recheck run.h5",
+    "store check results", "sweep no_study --workers 1",
     "reproduce --figure fig99",
 )  # fmt: skip
 LONG = {"verify", "prove", "reproduce", "compare", "bench"}  # a line that might start long work gets a wrong word

@@ -1,4 +1,4 @@
-"""Counterexamples: shrink a failing impact, write it as a test, and record the resolver's answers to it."""
+"""Counterexamples: shrink a failing impact, and write it as a test."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ import numpy as np
 from verification.impacts import ImpactCase
 from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS
-from verification.laws.engine import ENGINE_LAWS, budgets
-from verification.laws.resolver import Resolver, ResolverFault, outcome, own_outcome
 from verification.laws.strategies import tangents_are_independent
 
 _DIGITS = (0, 1, 2, 4, 8)
@@ -93,30 +91,23 @@ _BY_NAME = {"KIT": KIT, "FACTORED": FACTORED, "ONE_SIDED": ONE_SIDED}
 
 
 def as_test(case: ImpactCase, law: str, bounds: Bounds = KIT, resolver: Any = None, contract: str = "equality") -> str:
-    """Return the source code of a test of `law` on the case; if the resolver cannot be imported, its line is a gap.
-
-    The laws in ENGINE_LAWS (a budget, extreme inputs) always test the engine; `resolver` and `bounds` are then unused.
-    """
+    """Return the source code of a test of `law` on the case; if the resolver cannot be imported, its line is a gap."""
     arrays = {"mass_matrix": case.mass_matrix, "contact_jacobian": case.contact_jacobian, "velocity": case.velocity}
     optional = {name: getattr(case, name) for name in ("translations", "tangents", "friction", "unequal")}
     optional = {name: array for name, array in optional.items() if array is not None}
     more = "".join(f", {name}={name}" for name in optional)
+    table = "EXACT_LAWS" if law in EXACT_LAWS else CONTRACTS[contract].table
+    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else table
+    name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
+    tolerances = name or repr(bounds).replace("=inf", "=np.inf")
+    head = [f"from verification.laws import {table}, ImpactCase",
+            f"from verification.laws.bounds import {name or 'Bounds'}",
+            import_line(resolver) or "\n# resolver = ...  the one under test"]
     lines = [
         "", "", f"def test_{law}():", *(f"    {key} = {_written(array)}" for key, array in (arrays | optional).items()),
         f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
+        f"    residual = {table}[{law!r}].check(case, resolver, {tolerances})",
     ]
-    if law in ENGINE_LAWS:
-        head = ["from verification.laws import ImpactCase", "from verification.laws.engine import ENGINE_LAWS"]
-        lines += [f"    law = ENGINE_LAWS[{law!r}]", "    residual = law.check(case, law.ours)"]
-    else:
-        table = "EXACT_LAWS" if law in EXACT_LAWS else CONTRACTS[contract].table
-        table = "UNEQUAL_LAWS" if law.startswith("unequal_") else table
-        name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
-        head = [f"from verification.laws import {table}, ImpactCase",
-                f"from verification.laws.bounds import {name or 'Bounds'}",
-                import_line(resolver) or "\n# resolver = ...  the one under test"]
-        tolerances = name or repr(bounds).replace("=inf", "=np.inf")
-        lines += [f"    residual = {table}[{law!r}].check(case, resolver, {tolerances})"]
     return "\n".join(["import numpy as np", *head, *lines, "    assert residual.passed, residual"])
 
 
@@ -147,24 +138,3 @@ def _written(array: np.ndarray) -> str:
     """The array as source code; an empty array also needs its shape."""
     text = f"np.array({array.tolist()!r}, dtype=float)"
     return text if array.size else f"{text}.reshape({array.shape})"
-
-
-def strike(part: str, case: Any, resolver: Resolver) -> dict[str, Any] | None:
-    """Return the velocities after an impact, by `resolver` or, in the parts of ENGINE_LAWS, by the engine.
-
-    `velocity_after` (k, d) has one velocity, or one for each row budget that the law tries; `rows` (k,) are the rows
-    that the resolver may use. A velocity is NaN if the resolver gave no finite one; `complaint` gives the reason.
-    Returns None if the case is not an impact, such as a wall in the hand, two rooms, or a device with force limits.
-    """
-    if not isinstance(case, ImpactCase):
-        return None
-    subject = ENGINE_LAWS[part].ours if part in ENGINE_LAWS else resolver
-    rows = tuple(budgets(case)) if part == "truncation" else (case.contacts,)
-    after, complaints = np.full((len(rows), case.coordinates), np.nan), []
-    for velocity, budget in zip(after, rows, strict=True):
-        try:
-            velocity[:] = (outcome(partial(subject, budget=budget), case) if part == "truncation"
-                           else own_outcome(subject, case))  # fmt: skip
-        except ResolverFault as fault:
-            complaints.append(str(fault))
-    return {"rows": rows, "velocity_after": after, "complaint": "; ".join(complaints)}

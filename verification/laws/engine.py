@@ -29,16 +29,12 @@ ENGINE_LAWS: dict[str, Law] = {}  # the seeds of random cases depend on the orde
 
 
 # Anytime property: every truncation of the projector is passive, so a row budget never costs passivity.
-def budgets(case: ImpactCase) -> range:
-    """All budgets that may differ."""
-    return range(min(case.contacts, case.coordinates) + 1)
-
-
 @law(ENGINE_LAWS, "truncation", "an impact stopped after any number of rows is passive; after no row, no impulse",
      partial(draw_case, largest_condition=1e12), resolve_impact)
 def every_budget_is_passive(case: ImpactCase, subject: Callable[..., Any]) -> Found:
     """Largest relative energy gain over all budgets; infinite if a budget of 0 rows still gives an impulse."""
-    answers = [outcome(partial(subject, budget=budget), case) for budget in budgets(case)]
+    answers = [outcome(partial(subject, budget=budget), case)
+               for budget in range(min(case.contacts, case.coordinates) + 1)]
     worst = max(relative_gain(case.mass_matrix, case.velocity, v_plus) for v_plus in answers)
     idle = np.array_equal(answers[0], case.velocity)
     return worst if idle else np.inf, FACTORED.energy_gain(case)

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from iapb.errors import IapbError
-from reports.batches import worker_pool
+from reports.workers import executor
 
 ORPHANING = """
 import os, signal
-from reports.batches import worker_pool
+from reports.workers import executor
 if __name__ == "__main__":
-    with worker_pool(1) as pool:
+    with executor(1) as pool:
         print(pool.submit(os.getpid).result(60), flush=True)
         os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -35,7 +35,7 @@ def suicide():
 
 def test_workers_never_hear_ctrl_c_and_what_stops_the_work_ends_them_in_the_middle_of_theirs():
     others = set(active_children())
-    with pytest.raises(KeyboardInterrupt), worker_pool(1) as pool:
+    with pytest.raises(KeyboardInterrupt), executor(1) as pool:
         assert pool.submit(blocked).result(60) and not blocked()
         pool.submit(time.sleep, 20.0)
         [worker] = set(active_children()) - others
@@ -46,9 +46,9 @@ def test_workers_never_hear_ctrl_c_and_what_stops_the_work_ends_them_in_the_midd
 def test_a_worker_whose_parent_was_killed_ends(tmp_path):
     script = tmp_path / "orphaning.py"
     script.write_text(ORPHANING)
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     with (tmp_path / "said").open("w") as said:  # a pipe would stay open as long as the worker lives
-        done = subprocess.run([sys.executable, script], stdout=said, stderr=said, check=False,
-                              env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])})  # fmt: skip
+        done = subprocess.run([sys.executable, script], stdout=said, stderr=said, check=False, env=environment)
     worker = Path("/proc") / (tmp_path / "said").read_text().strip()
     for _ in range(600):
         if not worker.exists():
@@ -58,5 +58,5 @@ def test_a_worker_whose_parent_was_killed_ends(tmp_path):
 
 
 def test_a_killed_worker_is_one_of_our_errors():
-    with pytest.raises(IapbError, match="worker process was killed"), worker_pool(1) as pool:
+    with pytest.raises(IapbError, match="worker process was killed"), executor(1) as pool:
         pool.submit(suicide).result(60)

@@ -7,13 +7,11 @@ import pytest
 
 from iapb import resolve_impact
 from verification.impacts import Floats, ImpactCase
-from verification.laws import campaign as study
+from verification.laws import full as study
 from verification.laws.bounds import FACTORED, KIT
 from verification.laws.equality import LAWS, UNEQUAL_LAWS
 from verification.laws.planted import wrong_sign
 from verification.laws.resolver import own_outcome, sound_resolver
-
-SUBJECT = study.Subject(sound_resolver, KIT, 1e8)
 
 
 def test_the_laws_of_one_call_ask_once_and_keep_a_copy() -> None:
@@ -46,7 +44,7 @@ def test_every_law_has_its_part_of_the_impacts(part: str, laws: dict[str, object
 @pytest.mark.parametrize("index", [41452, 57210])
 def test_a_grazing_cradle_may_lose_an_impulse_below_rounding_in_another_frame(index: int) -> None:
     """Found by the long run: the clamp cuts an impulse of 1e-8 |u| that moves less energy than rounding does."""
-    engine = study.Subject(resolve_impact, FACTORED, 1e10)
+    engine = study.subject_of(resolve_impact)
     case = study.drawn(study.UNEQUAL, index, engine)
     law = UNEQUAL_LAWS["unequal_momentum"].check
     residual = law(case, resolve_impact, FACTORED)
@@ -57,3 +55,23 @@ def test_a_grazing_cradle_may_lose_an_impulse_below_rounding_in_another_frame(in
 
     broken = law(case, per_body, FACTORED)
     assert broken is not None and not broken.passed
+
+
+def test_the_plan_covers_every_part_once() -> None:
+    batches = study.plan(1_000_000, 5000)
+    assert {batch.part for batch in batches} == set(study.PARTS)
+    impacts = sorted((batch.first, batch.count) for batch in batches if batch.part == study.IMPACTS)
+    assert sum(count for _, count in impacts) == 1_000_000
+    assert all(first + count == following for (first, count), (following, _) in zip(impacts, impacts[1:], strict=False))
+    assert sum(batch.count for batch in batches if batch.part == study.TRAJECTORIES) == 5000
+
+
+def test_the_sum_over_batches_does_not_depend_on_how_the_cases_are_cut() -> None:
+    subject = study.subject_of(wrong_sign)
+    cut = [study.judge_batch(study.Batch(study.IMPACTS, first, 10), subject) for first in (0, 10)]
+    whole = study.judge_batch(study.Batch(study.IMPACTS, 0, 20), subject)
+    (counts, found), (expected, first) = study.summed(cut), study.summed([whole])
+    assert counts == expected and counts[study.IMPACTS]["kinetic_energy"].failures > 0
+    assert [(one.law, one.index) for one in sorted(found, key=lambda one: one.law)] == [
+        (one.law, one.index) for one in sorted(first, key=lambda one: one.law)
+    ]

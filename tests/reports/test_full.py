@@ -1,0 +1,78 @@
+"""`iapb verify --full`: what breaks a law is a test or a run, and Ctrl-C tells what was found until then."""
+
+import json
+from contextlib import nullcontext
+
+import pytest
+
+from iapb import resolve_impact
+from reports.cli import main
+from reports.commands import verify
+from reports.store import read_run
+from tests.reports.made_up import made_run
+from verification.laws.bounds import LawCount, LawResidual
+from verification.laws.full import (
+    IMPACTS,
+    TRAJECTORIES,
+    Found,
+    Outcome,
+    as_pytest,
+    drawn,
+    residuals,
+    subject_of,
+)
+from verification.laws.planted import wrong_sign
+
+FULL = ("verify", "--full", "--workers", "1", "--trajectories", "0", "--json")
+
+
+def test_a_broken_resolver_is_told_with_a_test_that_fails_as_pasted(capsys):
+    resolver = "verification.laws.planted:wrong_sign"
+    assert main([*FULL, "--resolver", resolver, "--impacts", "20"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert not found["passed"] and found["batches"] == found["judged"] == 1 and list(found["laws"]) == [IMPACTS]
+    [energy] = [one for one in found["counterexamples"] if one["law"] == "kinetic_energy"]
+    failures = {count["law"]: count["failures"] for count in found["laws"][IMPACTS]}
+    assert failures["kinetic_energy"] > 1 and energy["run"] is None
+    space = {}
+    exec(energy["test"], space)
+    assert space["resolver"] is wrong_sign
+    with pytest.raises(AssertionError):
+        space["test_kinetic_energy"]()
+
+
+class Here:
+    """An executor in this process, interrupted at the third batch."""
+
+    def map(self, judge, batches):
+        yield judge(batches[0])
+        yield judge(batches[1])
+        raise KeyboardInterrupt
+
+
+def test_ctrl_c_tells_what_was_judged_until_then_and_stores_a_run_that_breaks_a_law(capsys, monkeypatch, tmp_path):
+    def judged(resolver, seed, batch):
+        count = LawCount("ledger")
+        count.add(LawResidual("ledger", float(batch.first == 0), 0.5))
+        found = (Found("ledger", TRAJECTORIES, 7, None, made_run()),) if batch.first == 0 else ()
+        return Outcome(batch.part, (count,), found)
+
+    monkeypatch.setattr(verify, "executor", lambda workers: nullcontext(Here()))
+    monkeypatch.setattr(verify, "_judged", judged)
+    monkeypatch.chdir(tmp_path)
+    assert main(["verify", "--full", "--impacts", "20000"]) == 130
+    said = capsys.readouterr().out
+    assert "2 of " in said and "then stopped" in said and "BROKEN ledger: 1 of 2 break it" in said
+    assert "out/runs/trajectories-seed0-7.h5" in said
+    assert read_run(tmp_path / "out/runs/trajectories-seed0-7.h5").steps == 20
+
+
+@pytest.mark.parametrize("part", ["truncation", "hand_port", TRAJECTORIES])
+def test_a_case_that_is_no_impact_of_a_resolver_is_drawn_again_by_its_test(part):
+    subject = subject_of(resolve_impact, seed=3)
+    case = drawn(part, 5, subject)
+    found, run = residuals(part, 5, case, subject)
+    law = next(iter(found))
+    space = {}
+    exec(as_pytest(Found(law, part, 5, case, run), subject), space)
+    space[f"test_{law}"]()
