@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from iapb.run import Run
-from reference.hdf5 import try_file
 from reports.commands.run import describe, run_as_json
 from reports.show import Answer, Json
 from reports.store.runs import RunEntry, opened_run, read_provenance
@@ -25,7 +24,6 @@ def inspect(
     json_: Json = False,
 ) -> Answer:
     """Describe a run: scene, law, collisions, energy, effects, provenance and hashes."""
-    try_file(file)
     with opened_run(file) as (run, entry):
         return _run(run, entry, read_provenance(file), impacts)
 

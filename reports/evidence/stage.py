@@ -19,7 +19,7 @@ from typing import Any
 from reports.provenance import collect_provenance, this_machine
 from reports.runner import Runner
 from reports.store.keys import SOURCES, evidence_version, hash_of, plain
-from reports.store.tables import read_record, write_record
+from reports.store.records import read_record, write_record
 from reports.uses import StoredFile
 from verification.finding import Failure, attempt
 
@@ -86,9 +86,9 @@ class Stage:
         incomplete.unlink(missing_ok=True)
         if self.failures:
             self.path = incomplete
-        write_record(self.path, {"runs": list(used.values()), "records": records}, f"Records of the stage {self.name}",
-                     runs=tuple(used), command="iapb reproduce",
-                     provenance=collect_provenance() | {SOURCES: evidence_version()})  # fmt: skip
+        provenance = collect_provenance() | {SOURCES: evidence_version()}
+        content = {"runs": list(used.values()), "records": records}
+        write_record(self.path, content, f"Records of the stage {self.name}", provenance, tuple(used))
         self.records, self.runs = found, dict(used)
 
     def _checked(self, records: Any) -> Any:

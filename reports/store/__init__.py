@@ -7,7 +7,7 @@ from iapb.lazy import lazy_names
 
 _HOME = {
     "RunStore": ".folder", "content_hash": ".keys", "run_key": ".keys", "RunEntry": ".runs", "read_provenance": ".runs",
-    "read_run": ".runs", "write_run": ".runs", "read_table": ".tables", "write_table": ".tables",
+    "read_run": ".runs", "write_run": ".runs",
 }  # fmt: skip
 
 __getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

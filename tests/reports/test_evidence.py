@@ -143,7 +143,7 @@ def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path):
     path = filled(tmp_path, lambda _: FINDING).path
     whole = path.read_bytes()
     for damage, said in ((flipped, ""), (lambda content: content[:-100], "checksum"),
-                         (without_records, "records is missing")):  # fmt: skip
+                         (without_records, "json is missing")):  # fmt: skip
         path.write_bytes(damage(whole))
         damaged = filled(tmp_path, lambda _: FINDING)
         assert damaged.records is None and damaged.failures[0].error == "RunFileError"
@@ -185,10 +185,10 @@ def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypa
     def compute(*_):
         raise raised.pop(0)("the disk went away\nand more")
 
-    monkeypatch.setattr(gather, "plans", lambda: {"engines": Plan(Finding, compute)})
-    stage, again = (Stage(tmp_path / "tables", "engines", Finding, "quick") for _ in range(2))
+    monkeypatch.setattr(gather, "plans", lambda: {"mechanics": Plan(Finding, compute)})
+    stage, again = (Stage(tmp_path / "tables", "mechanics", Finding, "quick") for _ in range(2))
     topic = gather._failed(gather._fill(stage, Runner(tmp_path / "runs"), "quick", nothing))
-    assert topic.key == "engines" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
+    assert topic.key == "mechanics" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
     page = build_report(Evidence(topics=(topic,)))[FIRST_PAGE]
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
     assert "Not computed, after RuntimeError: the disk went away." in first and "and more" not in first

@@ -18,22 +18,18 @@ from reports.store import (
     keys,
     read_provenance,
     read_run,
-    read_table,
     run_key,
     write_run,
-    write_table,
 )
 from reports.store.io import sealed
 from reports.store.schema import FORMAT_VERSION
 from tests.reports.made_up import made_run
-from verification.table import titled
 
 TURNED = {
     "q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)), "device_q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)),
     "coordinate_names": ("base.w", "base.x", "base.y", "base.z"), "coordinate_units": ("1",) * 4,
     "velocity_names": ("base.rx", "base.ry", "base.rz"), "velocity_units": ("rad/s",) * 3, "tool_coordinates": (0, 4),
 }  # a configuration that is longer than the velocity
-TABLE = titled(("point", "energy [J]", "world", "rank"), [(3, 0.5, "A", None), (1, 0.25, "ä", 2)])
 
 
 def bits(value):
@@ -162,20 +158,6 @@ def test_provenance_is_complete(tmp_path):
     assert read_provenance(write_run(tmp_path / "run.h5", made_run(), provenance=facts)) == facts
     for name in ("version", "commit", "dirty", "lock", "cpu", "blas", "numba", "seeds", "command"):
         assert facts[name]
-
-
-def test_a_table_comes_back_and_xarray_reads_it(tmp_path):
-    path = write_table(tmp_path / "t.h5", "fig03", TABLE, title="Figure 3", command="iapb sweep")
-    found = read_table(path, "fig03")
-    assert found.titles == TABLE.titles and found["world"] == ["A", "ä"] and found["energy"] == [0.5, 0.25]
-    assert found["rank"][1] == 2.0 and found["rank"][0] != found["rank"][0]
-    assert read_table(write_table(path, "bare", titled(("x",)))).rows == ()
-    write_table(path, "fig03", TABLE)
-    with xarray.open_dataset(path, engine="h5netcdf", group="fig03") as dataset:
-        assert dataset["energy"].dims == ("point",) and dataset["energy"].attrs["units"] == "J"
-        assert float(dataset["energy"].sel(point=1)) == 0.25
-    with pytest.raises(RunFileError, match="did you mean|expected"):
-        read_table(path, "third")
 
 
 # What a key covers: every input, every line of code that can change a number, and no comment

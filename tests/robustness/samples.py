@@ -12,9 +12,8 @@ import numpy as np
 from iapb import find_scene, load_scene
 from reference.worlds import run_world
 from reports.store import RunStore
-from reports.store.tables import write_table
+from reports.store.records import write_record
 from tests.reference.fclib_files import local_file, matrix_group
-from verification.table import titled
 
 TIMES = int(os.environ.get("IAPB_FUZZ", "1"))  # how often each fault is done, and a multiple of the wrong inputs
 
@@ -45,7 +44,7 @@ def result_files():
     """A short run, and a table."""
     with tempfile.TemporaryDirectory() as folder:
         run, table = put(Path(folder)), Path(folder) / "table.h5"
-        write_table(table, "sample", titled(("x [m]", "word"), [(0.5, "a"), (1.5, "b")]))
+        write_record(table, [[0.5, "a"], [1.5, "b"]], "sample", {})
         return {"run.h5": run.read_bytes(), "table.h5": table.read_bytes()}
 
 

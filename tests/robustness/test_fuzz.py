@@ -32,7 +32,7 @@ from reference.datasets import read_problem
 from reports.cli import main
 from reports.commands.inspect import inspect
 from reports.store.io import sealed
-from reports.store.tables import read_table
+from reports.store.records import read_record
 from reports.sweep import load_study
 from tests.robustness.samples import TIMES, fclib_files, result_files
 
@@ -218,7 +218,7 @@ def read_results(path):
         with contextlib.redirect_stdout(io.StringIO()):
             inspect(path, 3)
     except RunFileError:
-        read_table(path, "sample")
+        read_record(path)
 
 
 LCP = b"2\n2 1\n1 2\n-5 -6\n"
