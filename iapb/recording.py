@@ -181,7 +181,7 @@ class Recorder:
         self.records, self.first = [], self.steps
         return piece
 
-    def _joined(self, lines: str) -> dict[str, Any]:
+    def joined(self, lines: str) -> dict[str, Any]:
         """Return copies of the columns of `steps`, `contacts` or `impacts` over all records; states from the start."""
         number = list(LINES).index(lines)
         first = self.start if lines == "steps" else {}
@@ -194,7 +194,7 @@ class Recorder:
         """Return the steps held as a Run."""
         simulation, system = self.simulation, self.simulation.system
         law, coupling, scene, mechanism = simulation.law, simulation.coupling, simulation.scene, system.mechanism
-        steps, impacts = self._joined("steps"), self._joined("impacts")
+        steps, impacts = self.joined("steps"), self.joined("impacts")
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
         struck = steps["q"][impacts["step"] - self.first]
         ledger, planar = self._ledger, not isinstance(scene, SpatialScene)
@@ -213,7 +213,7 @@ class Recorder:
             velocity_names=mechanism.velocity_names, velocity_units=mechanism.velocity_units,
             body_names=mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
             time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **steps,
-            contacts=ContactTable(offsets, **self._joined("contacts")),
+            contacts=ContactTable(offsets, **self.joined("contacts")),
             impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, struck)),
             effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores) for one in simulation.effects),
             chunk_steps=np.array([steps for steps, _ in self.timings], np.int64),

@@ -47,13 +47,11 @@ class RecordedLoop:
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.steps_done = system.make_state(), 0
         simulation.port = system.make_port(simulation.coupling)
-        self.recording, total = Recorder(simulation), 0.0
+        simulation.prepare()  # the timed calls contain steps only
+        self.recording = Recorder(simulation)
+        total = 0.0
         while self.recording.steps < self.steps:
-            record, size = self.recording.blank(self.steps)
-            if self.recording.steps == 0:
-                simulation.prepare()  # the timed call contains steps only
-            (done, stop), spent = timed(partial(simulation.advance_chunk, record, size))
-            self.recording.keep(record, done, spent)
+            stop, spent = timed(partial(self.recording.chunk, self.steps))
             total += spent
             if stop is not None:
                 raise stop

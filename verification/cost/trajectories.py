@@ -235,7 +235,7 @@ def _our_world(name: str) -> World:
     def run(scene: Scene) -> tuple[Run, float]:
         loop = RecordedLoop(Simulation(scene, find_world(name).law), scene.steps)
         seconds = loop.sample() * loop.steps
-        return loop.recording.run("", name), seconds
+        return loop.recording.run(name, ""), seconds
 
     return run
 
