@@ -145,11 +145,12 @@ class Recorder:
         lines = make_record(1, self.coordinates, 0, 0).arrays()[1:]
         return 2 * sum(array.nbytes for array in lines) + 8 * len(FORCES) + 40
 
-    def chunk(self, total: int) -> BaseException | None:
-        """Simulate and record the next chunk; return the exception that stopped it early, if any."""
+    def chunk(self, total: int, most: int | None = None) -> BaseException | None:
+        """Simulate and record the next chunk, of at most `most` steps; return the exception that stopped it early."""
         if self._thinned and (self.steps - self.first) * self._line_bytes > _PIECE:
             self._thin("", "", last=False)
-        size = chunk_steps(self.simulation.system.capacity, total - self.steps)
+        left = total - self.steps
+        size = chunk_steps(self.simulation.system.capacity, left if most is None else min(left, most))
         if not self.records or len(self.records[-1].steps.q) < self.records[-1].used[0] + size:
             room = int(_ROOM / max(1, self._line_bytes))
             self.records.append(make_record(max(size, min(total - self.steps, room)), *self.shape))

@@ -136,7 +136,7 @@ class Simulation:
             The step fails (see `iapb.contact.kernels.step`), or the law returned an invalid step.
         """
         if hand_force is not None:
-            self._grip(hand_force)
+            self.hold(hand_force)
         world, state, port = blocks = self.world, self.state, self.port
         if self._planned:
             port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
@@ -166,7 +166,8 @@ class Simulation:
         """A record that is never written, for steps that are not recorded."""
         return make_record(1, *Recorder(self).shape)
 
-    def _grip(self, hand_force: ArrayLike) -> None:
+    def hold(self, hand_force: ArrayLike) -> None:
+        """Set the force of the hand from now on; see `step`."""
         if self.system.tool_tree < 0:
             raise ArgumentError("hand_force", hand_force, f"None: scene {self.scene.name} has no hand")
         given = real_numbers(hand_force)

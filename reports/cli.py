@@ -25,6 +25,7 @@ COMMANDS = {
     "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
     "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
     "scenes": "List the scenes that come with the project: their names, and what they show.",
+    "view": "Show SCENE in real time in a browser, with the mouse as the hand, and store the run.",
     "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
     "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
     "certify": "Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent.",
@@ -41,7 +42,7 @@ COMMANDS = {
 }  # fmt: skip
 
 GROUPS = {  # of the help, in its order
-    "Simulate": ("run", "check", "scenes", "schema", "effects", "sweep"),
+    "Simulate": ("run", "check", "scenes", "schema", "effects", "view", "sweep"),
     "Look at runs": ("inspect", "certify", "compare", "store"),
     "Verify": ("verify", "prove", "bench"),
     "The paper": ("reproduce", "report"),

@@ -21,6 +21,7 @@ from iapb.simulation import simulate
 from iapb.worlds import find_world
 from reports.store.keys import canonical_json, content_hash, result_head, results_of
 from reports.store.runs import read_run
+from reports.view.loop import PULLED
 
 # name of a law -> (module, class); any other law is taken from the world that has it
 LAWS = {
@@ -70,9 +71,12 @@ def repeat_run(path: Path | str) -> Repetition:
     RunFileError
         The file is not a run, or it is damaged.
     ArgumentError
-        The law or coupling is not one of the project's, so the file alone does not suffice to repeat the run.
+        The law or coupling is not one of the project's, or the mouse pulled the tool, so the file alone does not
+        suffice to repeat the run.
     """
     stored = read_run(path)
+    if PULLED in stored.remarks:
+        raise ArgumentError("path", str(path), "a run without the mouse, which its scene gives again")
     again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world,
                      steps=stored.steps_done, every=stored.every)
     return Repetition(content_hash(stored), content_hash(again), differences(stored, again))

@@ -6,6 +6,8 @@ Without a browser the tests are skipped, and say so.
 
 import re
 import shutil
+import subprocess
+import sys
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,6 +23,8 @@ from reports.figures.paper import arm_energies
 from reports.pages.builder import build_report, draw_all
 from reports.pages.records import Evidence
 from reports.report import write_report
+from reports.store.runs import read_run
+from reports.view.loop import PULLED
 from tests.reports.made_up import made_motion
 from verification.finding import MIXED, REPRODUCED, Part, finding_of
 from verification.table import titled
@@ -30,7 +34,7 @@ pytestmark = pytest.mark.thorough
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
+    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
 )  # fmt: skip
 DESK, PHONE = (1400, 900), (400, 860)
 FIGURES = ("hero", "fig07", "fig08", "film-corner", "film-hole", "fig03")
@@ -330,3 +334,24 @@ def test_a_film_plays_stops_and_shows_the_poses_of_the_run(see, first, evidence)
     expected = made.flat(corners @ turn.T + [x, y])
     local = np.array([list(map(float, pair.split())) for pair in drawn.strip("Mz").split("L")])
     np.testing.assert_allclose(local @ [[a, b], [c, d]] + [e, f], expected, atol=0.3)  # of 400 units of the picture
+
+
+def test_the_mouse_pulls_the_peg_out_of_the_corner_and_closing_the_page_stores_the_run(started, tmp_path):
+    command = [sys.executable, "-m", "reports.cli", "view", "peg_corner", "--no-browser", "--out", str(tmp_path)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        address = next(line.split()[1] for line in process.stderr if line.startswith("Open "))
+        page = started.new_page(viewport={"width": 800, "height": 560})
+        page.goto(address)
+        page.wait_for_timeout(6000)  # the peg comes to rest in the corner
+        page.mouse.move(472, 336)
+        page.mouse.down()
+        for step in range(8):
+            page.mouse.move(472 - 25 * step, 336 - 25 * step)
+        page.wait_for_timeout(2000)
+        page.mouse.up()
+        page.close()
+        assert process.wait(timeout=120) == 0
+    [file] = tmp_path.glob("peg_corner-IAPB-*.h5")
+    run = read_run(file)
+    pulled = np.flatnonzero(np.any(run.hand_force != run.hand_force[0], axis=1))
+    assert PULLED in run.remarks and np.ptp(run.q[pulled, :2], axis=0).min() > 5e-3
