@@ -148,7 +148,7 @@ class Recorder:
     def chunk(self, total: int, most: int | None = None) -> BaseException | None:
         """Simulate and record the next chunk, of at most `most` steps; return the exception that stopped it early."""
         if self._thinned and (self.steps - self.first) * self._line_bytes > _PIECE:
-            self._thin("", "", last=False)
+            self._thin(self._thinned, "", "", last=False)
         left = total - self.steps
         size = chunk_steps(self.simulation.system.capacity, left if most is None else min(left, most))
         if not self.records or len(self.records[-1].steps.q) < self.records[-1].used[0] + size:
@@ -165,17 +165,17 @@ class Recorder:
     def run(self, world: str, stopped: str) -> Run:
         """Return the recorded steps as a Run; `stopped` says why it is incomplete, empty if it is complete."""
         if self._thinned:
-            return self._thinned.run(self._thin(world, stopped, last=True))
+            return self._thinned.run(self._thin(self._thinned, world, stopped, last=True))
         return self._held(world, stopped)
 
-    def _thin(self, world: str, stopped: str, last: bool) -> Run:
+    def _thin(self, thinned: Thinned, world: str, stopped: str, last: bool) -> Run:
         """Thin and release the steps held; return them as a run."""
         piece = self._held(world, stopped)
         ledger = self._ledger(piece)
         vars(piece)["energy"] = _shown(ledger, piece)
         at_first = {name: getattr(piece, name)[0].copy() for name in ("q", "v")}
         energy_at_first = {name: piece.energy[name][0] for name in ("kinetic", "potential")}
-        self._thinned.add(piece, self.first, self._before, last)
+        thinned.add(piece, self.first, self._before, last)
         self._at_first = self._at_first or (at_first, energy_at_first)
         self._before = last_of(ledger, self._before)
         self.start = {each.name: getattr(piece, each.name)[-1].copy() for each in STATES}

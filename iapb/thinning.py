@@ -61,6 +61,7 @@ class Thinned:
         """Return the thinned run; `piece` is the last one, with all that is no array."""
         found = {name: np.concatenate(pieces) for name, pieces in self._columns.items()}
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(found["contacts/count"])])
+        arrays: dict[str, Any] = {name: found[name] for name in (*_STATES, *_STEPS)}
         contacts = {name: found[f"contacts/{name}"] for name in _CONTACTS}
         impacts = {name: found[f"impacts/{name}"] for name in _IMPACTS}
         energy = {
@@ -74,7 +75,7 @@ class Thinned:
             energy=energy,
             every=self.every,
             distrust=self.distrust,
-            **{name: found[name] for name in (*_STATES, *_STEPS)},
+            **arrays,
         )
 
 

@@ -42,7 +42,9 @@ class Budget:
         """Count bytes; raise ValueError if more than allowed are read."""
         self.left -= size
         if self.left < 0:
-            raise ValueError(f"{what} asks for more than the {self.allowed} bytes that may be read (argument budget)")
+            raise ValueError(
+                f"{what} asks for more than the {self.allowed} bytes that may be read (argument budget)"
+            )
 
 
 def group_at(group: Any, name: str) -> Any:
@@ -124,7 +126,9 @@ def attribute_of(item: Any, name: str, default: Any = None) -> Any:
         return default
     count = prod(item.attrs.get_id(name).shape or ())
     if count > _MOST_VALUES:
-        raise ValueError(f"the attribute {name} has {count} values: expected at most {_MOST_VALUES}")
+        raise ValueError(
+            f"the attribute {name} has {count} values: expected at most {_MOST_VALUES}"
+        )
     return item.attrs[name]
 
 
@@ -137,8 +141,12 @@ def _item_at(group: Any, name: str) -> Any:
         if link is None:
             raise ValueError(f"{group.name.rstrip('/')}/{name} is missing")
         if not isinstance(link, h5py.HardLink):
-            kind = "a link to another file" if isinstance(link, h5py.ExternalLink) else "a soft link"
-            raise ValueError(f"{group.name.rstrip('/')}/{name} is {kind}: expected a file without links")
+            kind = (
+                "a link to another file" if isinstance(link, h5py.ExternalLink) else "a soft link"
+            )
+            raise ValueError(
+                f"{group.name.rstrip('/')}/{name} is {kind}: expected a file without links"
+            )
         found = found[part]
     return found
 
@@ -167,7 +175,9 @@ def _check_size(dataset: Any, budget: Budget) -> None:
     if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * stored:
         raise ValueError(f"{name} states {dataset.size} values, more than its bytes can hold")
     largest = max(prod(dataset.shape[1:]), prod(dataset.chunks or (0,))) * width
-    if dataset.compression and _MOST_PACKED * stored > budget.allowed:  # a chunk may unpack to more than it states
+    if (
+        dataset.compression and _MOST_PACKED * stored > budget.allowed
+    ):  # a chunk may unpack to more than it states
         sizes: list[int] = []
         dataset.id.chunk_iter(lambda chunk: sizes.append(chunk.size))
         largest = max(largest, _MOST_PACKED * max(sizes, default=0))

@@ -18,7 +18,7 @@ from typing import Any
 
 from reports.provenance import collect_provenance, this_machine
 from reports.runner import Runner
-from reports.store.keys import SOURCES, evidence_version, hash_of, plain
+from reports.store.keys import evidence_version, hash_of, plain
 from reports.store.records import read_record, write_record
 from reports.uses import StoredFile
 from verification.finding import Failure, attempt
@@ -86,7 +86,7 @@ class Stage:
         incomplete.unlink(missing_ok=True)
         if self.failures:
             self.path = incomplete
-        provenance = collect_provenance() | {SOURCES: evidence_version()}
+        provenance = collect_provenance() | {"sources": evidence_version()}
         content = {"runs": list(used.values()), "records": records}
         write_record(self.path, content, f"Records of the stage {self.name}", provenance, tuple(used))
         self.records, self.runs = found, dict(used)

@@ -75,11 +75,17 @@ def _state(path: Path) -> FileState:
         if kind not in (FORMAT, TABLE_FORMAT):
             return FileState(path, FOREIGN, "an HDF5 file of somebody else's")
         if version != FORMAT_VERSION:
-            return FileState(path, OTHER, f"its format has version {version}, and this iapb reads {FORMAT_VERSION}")
+            return FileState(
+                path,
+                OTHER,
+                f"its format has version {version}, and this iapb reads {FORMAT_VERSION}",
+            )
         if kind == FORMAT:
             with opened_run(path) as (run, _):
                 if not run.complete or path.name.endswith(PARTIAL_SUFFIX):
-                    return FileState(path, PARTIAL, f"{run.steps_done} steps are readable; {run.stopped}")
+                    return FileState(
+                        path, PARTIAL, f"{run.steps_done} steps are readable; {run.stopped}"
+                    )
     except RunFileError as error:
         return FileState(path, DAMAGED, str(error).removeprefix(f"{path}: "))
     return FileState(path, WHOLE)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
-from reports.store.keys import code_label, run_key
+from reports.store.keys import run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
 PARTIAL_SUFFIX = ".partial"
@@ -100,7 +100,7 @@ class RunStore:
     def _keep(self, place: Place, run: Run) -> RunEntry:
         if not run.complete:
             return store_run(place.partial, run, key=place.key, replace=True)
-        entry = store_run(place.path, run, key=place.key, code=code_label(self.code))
+        entry = store_run(place.path, run, key=place.key)
         place.partial.unlink(missing_ok=True)
         return entry
 

@@ -29,7 +29,7 @@ from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
 WRITING = ".writing"  # suffix of a file that is not yet complete
 
 _MARK = b"\niapb sha256 "
-SEAL = len(_MARK) + 64 + 1  # bytes: the mark, 64 hexadecimal digits, a newline
+_SEAL = len(_MARK) + 64 + 1  # bytes: the mark, 64 hexadecimal digits, a newline
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FORMATS = (FORMAT, TABLE_FORMAT)
 _HEAD = 1 << 16  # bytes, among which the attributes of a file are
@@ -111,7 +111,7 @@ def _ends(path: Path) -> tuple[bytes, bytes]:
     """Return the head of a file, and as many last bytes as a seal has."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
-        file.seek(max(path.stat().st_size - SEAL, 0))
+        file.seek(max(path.stat().st_size - _SEAL, 0))
         return head, file.read()
 
 
@@ -125,7 +125,7 @@ def _check_seal(path: Path) -> None:
     head, mark = _ends(path)
     if not head.startswith(_HDF5_SIGNATURE):
         raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
-    size = path.stat().st_size - SEAL
+    size = path.stat().st_size - _SEAL
     if size < 0 or not mark.startswith(_MARK):
         raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb; "
                            "if it was a run, remove it to compute it again")

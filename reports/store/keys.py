@@ -26,8 +26,6 @@ from reports.store.schema import GROUPS, RESULT_GROUPS
 
 # Sources that can change a number in a run: the engine, the reference worlds, and the numeric packages.
 _SOURCES = ("iapb", "reference")
-_ENGINE = "iapb"
-SOURCES = "sources"  # entry of a table's provenance: the `evidence_version` that made it
 _ROOT = Path(__file__).resolve().parents[2]
 _NUMERIC_PACKAGES = ("numpy", "numba", "scipy")
 
@@ -119,16 +117,6 @@ def run_key(inputs: Mapping[str, Any], code: str | None = None) -> str:
     include the code of your own law.
     """
     return hash_of({"inputs": inputs, "code": code_version() if code is None else code})
-
-
-def code_label(code: str | None = None) -> str:
-    """Return the code entry of a run file: the engine's version, or the label given to its store."""
-    return f"{_ENGINE} {code_version()}" if code is None else code
-
-
-def is_older_engine(label: str) -> bool:
-    """Return whether a run file was made by another version of the engine; False for a user's own label."""
-    return label.startswith(f"{_ENGINE} ") and label != code_label()
 
 
 def add_array(digest: Any, name: str, array: Any) -> None:

@@ -54,13 +54,13 @@ def write_run(
 
 
 def store_run(
-    path: Path | str, run: Run, *, key: str, code: str = "", replace: bool = False,
+    path: Path | str, run: Run, *, key: str, replace: bool = False,
     provenance: Mapping[str, str] | None = None,
 ) -> RunEntry:
-    """Write one run like `write_run`, with the label of its code; return the entry of the new file."""
+    """Write one run like `write_run`; return the entry of the new file."""
     path = Path(path)
     with io.new_file(path, replace=replace) as file:
-        _write_run(file, run, key, code, provenance)
+        _write_run(file, run, key, provenance)
         file.attrs["content_hash"] = content_hash(run)
         return _entry(file, path)
 
@@ -74,10 +74,10 @@ def _columns(run: Run) -> Iterator[tuple[str, Quantity, Any]]:
         yield "energy", Quantity(name, (energy_dimension(run, name),), np.float64, "J", meaning), values
 
 
-def _write_run(file: Any, run: Run, key: str, code: str, provenance: Mapping[str, str] | None) -> None:
+def _write_run(file: Any, run: Run, key: str, provenance: Mapping[str, str] | None) -> None:
     file.attrs.update({
         "format": schema.FORMAT, "format_version": schema.FORMAT_VERSION, "title": f"{run.scene_name} · {run.world}",
-        "status": "complete" if run.complete else "partial", "stopped": run.stopped, "run_key": key, "code": code,
+        "status": "complete" if run.complete else "partial", "stopped": run.stopped, "run_key": key,
         "dt": float(run.dt), "energies": json.dumps([*run.energy]), "every": run.every,
         "tool_dofs": run.tool_dofs, "tool_coordinates": run.tool_coordinates,
         **{name: json.dumps(getattr(run, name), ensure_ascii=False) for name in schema.SENTENCES},
