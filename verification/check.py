@@ -234,14 +234,14 @@ class Topic:
     """A section of the report: a question and the checks that answer it.
 
     key, title, question : as in `Finding`; checks : one table each, in the order of the report
-    says : (tables by key of the check, all parts) -> the answer on the first page; a Part if it quotes quantities
+    says : (tables by key of the check, all parts) -> the answer on the first page
     """
 
     key: str
     title: str
     question: str
     checks: tuple[Check, ...]
-    says: Callable[[Mapping[str, Table], Sequence[Part]], str | Part]
+    says: Callable[[Mapping[str, Table], Sequence[Part]], str]
 
     def __call__(
         self, run: Callable[..., Run], depth: str, progress: Callable[[int, int], None],
@@ -280,8 +280,7 @@ class Topic:
                 said = partial(check.sentences, tables[check.key])
                 parts += attempt(f"{check.key}, its sentence", said, lost) or ()
         parts += given
-        told = attempt("the answer", partial(self.says, tables, parts), lost) or ""
-        answer = told if isinstance(told, Part) else Part(told, "")
+        answer = attempt("the answer", partial(self.says, tables, parts), lost) or ""
         known = {one.case for one in failures}
-        return finding_of(self.key, self.title, self.question, answer.sentence, parts, tables,
-                          [*failures, *(one for one in lost if one.case not in known)], answer.quantities)
+        return finding_of(self.key, self.title, self.question, answer, parts, tables,
+                          [*failures, *(one for one in lost if one.case not in known)])

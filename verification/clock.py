@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.finding import MIXED, REPRODUCED, Failure, Part, Quantities, attempt
+from verification.finding import MIXED, REPRODUCED, Failure, Part, attempt
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
@@ -88,13 +88,12 @@ def target(asked: str, measured: str, wanted: str, met: bool, miss: str = "", *,
 
 def limited(
     what: str, value: float, limit: float, unit: str = "", more: str = "", *, least: bool = False, timed: bool = True,
-    quantities: Quantities = (),
 ) -> Part:
     """Return a part on a value that should be at most (`least`: at least) the limit; `what` begins its sentence."""
     told, met = f"{what} {value:.3g}{unit}", value >= limit if least else value <= limit
     wanted, asked = f"at {'least' if least else 'most'} {limit:g}{unit}", f"{what[0].upper()}{what[1:]}"
     return Part(f"{asked} {value:.3g}{unit}{more}. Target: {wanted}.", REPRODUCED if met else MIXED, timed=timed,
-                miss="" if met else f"{told} (our own target: {wanted.removesuffix(unit)})", quantities=quantities,
+                miss="" if met else f"{told} (our own target: {wanted.removesuffix(unit)})",
                 asked=asked, measured=f"{value:.3g}{unit}{more}", target=wanted)  # fmt: skip
 
 

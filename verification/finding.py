@@ -7,7 +7,6 @@ This module is independent of pages and files.
 
 from __future__ import annotations
 
-import re
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -41,11 +40,6 @@ LEAST_DECIDED = 10  # least number of trials that reproduce a part; for the reas
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
 FAILED_CASES = "not computed"  # name of the table of cases that failed
-# Quantities that several pages quote: in a report each has one value and one verdict. To add one, add its name here;
-# the Part or Finding whose sentence quotes it lists the name with the value as printed.
-QUANTITIES = ("impacts certified", "adverse impacts certified", "time of a peg step", "exponent of bodies",
-              "hard cases of the engine", "speed targets")  # fmt: skip
-Quantities = tuple[tuple[str, str], ...]  # names and values
 
 
 @dataclass(frozen=True)
@@ -61,7 +55,6 @@ class Part:
     miss : one short clause for the first page that says where our method falls short; otherwise ""
     role : "" for the statement of the question, MISPRINT or BEYOND for what is shown beside it and never decides
     named : the quantity in words, for "fails in ..."; by default the name
-    quantities : the QUANTITIES that the sentence quotes, each with its value as printed there
     asked, measured, target : the part as a row of a table, if it has them
     """
 
@@ -79,13 +72,9 @@ class Part:
     miss: str = ""
     role: str = ""
     named: str = ""
-    quantities: Quantities = ()
     asked: str = ""
     measured: str = ""
     target: str = ""
-
-    def __post_init__(self) -> None:
-        check_quantities(self.quantities, self.sentence)
 
     @classmethod
     def of(cls, asked: str, measured: str, target: str, verdict: str, name: str = "", **more: Any) -> Part:
@@ -127,7 +116,6 @@ class Finding:
     axes : keys of the columns for a map of the outcome: horizontal axis, vertical axis, and one map per value
     failures : the cases that raised an exception; the tables lack their rows
     timed : True if the verdict or the answer depends on measured times
-    quantities : the QUANTITIES that the answer quotes, each with its value as printed there
     """
 
     key: str
@@ -141,10 +129,6 @@ class Finding:
     axes: tuple[str, ...] = ()
     failures: tuple[Failure, ...] = ()
     timed: bool = False
-    quantities: Quantities = ()
-
-    def __post_init__(self) -> None:
-        check_quantities(self.quantities, self.answer)
 
     @property
     def outcome(self) -> str:
@@ -176,15 +160,6 @@ class Finding:
     def miss(self) -> str:
         """The clauses of all parts that say where our method falls short; "" if there is none."""
         return "; ".join(part.miss for part in self.parts if part.miss)
-
-
-def check_quantities(quantities: Quantities, sentence: str) -> None:
-    """Raise ArgumentError unless each quantity is one of QUANTITIES and the sentence contains its value."""
-    for name, value in quantities:
-        if name not in QUANTITIES:
-            raise ArgumentError("quantity", name, one_of(name, QUANTITIES))
-        if not re.search(rf"(?<![\w.,]){re.escape(value)}(?!\w|[.,]\d)", sentence):  # no piece of a longer number
-            raise ArgumentError(f"value of the quantity {name!r}", value, f"a number that is part of: {sentence}")
 
 
 def _listed(before: str, names: Iterable[str]) -> str:
@@ -295,13 +270,12 @@ def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
 
 def finding_of(
     key: str, title: str, question: str, answer: str, parts: Iterable[Part],
-    tables: Mapping[str, Table] | None = None, failures: Sequence[Failure] = (), quantities: Quantities = (),
+    tables: Mapping[str, Table] | None = None, failures: Sequence[Failure] = (),
 ) -> Finding:  # fmt: skip
     """Return the finding made of `parts` and `failures`: it has the worst verdict, and is timed if any part is."""
     parts = tuple(parts)
     timed = any(part.timed for part in parts)
-    made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed,
-                   quantities=quantities)
+    made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed)
     return with_failures(made, failures)
 
 

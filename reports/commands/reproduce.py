@@ -23,7 +23,6 @@ from reports.figures.figure import draw, standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, draw_all, figure_inputs
 from reports.pages.first import count_claims
-from reports.pages.quantities import contradictions, unsaid
 from reports.pages.records import FailedCases
 from reports.report import keep_answer, kept_answer, report_key, write_companions, write_report
 from reports.runner import Runner
@@ -72,7 +71,6 @@ def make_report(out: Path, depth: str) -> Answer:
     beside = write_companions(out, evidence, figures, depth)
     ended, files = time.perf_counter(), len(evidence.manifest)
     took = {**evidence.seconds, "figures and page": ended - gathered}
-    contradicted, missing = contradictions(evidence), unsaid(evidence)
     counts = count_claims(evidence.claims)
     lines = [
         *([f"Of {len(evidence.claims)} claims of the paper "
@@ -81,16 +79,13 @@ def make_report(out: Path, depth: str) -> Answer:
         f"\n{path} ({path.stat().st_size / 1e6:.1f} MB, from {files} run and table files) in {ended - started:.0f} s.",
         f"Beside it: {', '.join(file.name for file in beside)}.",
         f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.",
-        *(f"More than one value in the report. {name}: {', '.join(texts)}." for name, texts in contradicted.items()),
         *_failure_lines(failed),
     ]
-    if missing and not failed:
-        lines.append(f"No page of the report says: {', '.join(missing)}.")
     answers = {topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics}
     claims = {claim.key: {"outcome": claim.outcome, "answer": claim.answer} for claim in evidence.claims}
     facts = {"page": path, "claims": claims, "beside": beside, "files": files, "seconds": took, "answers": answers,
-             "contradictions": contradicted, "failed": failed, "unsaid": missing}
-    if failed or contradicted or missing:
+             "failed": failed}
+    if failed:
         return Answer(facts, lines, 1)
     keep_answer(out, key, facts, lines, (entry.file for entry in evidence.manifest))
     return Answer(facts, lines)

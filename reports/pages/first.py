@@ -10,7 +10,6 @@ from math import degrees
 from statistics import median
 from typing import NamedTuple
 
-from reports.pages.quantities import peg_step
 from reports.pages.records import Evidence
 from verification.claims.conditions import Condition
 from verification.claims.peg import LARGE, closest_in, small_tilts
@@ -124,9 +123,16 @@ def _path(claim: Finding | None) -> Iterator[tuple[bool, str]]:
             f"the hand's path nearest to the path at a rigid wall in {each}; starts with similar paths do not count.")
 
 
+def _peg_step(evidence: Evidence) -> str:
+    """Return the time of a step of the peg in the corner, "" if it was not measured."""
+    table = evidence.inputs.get("effect_steps")
+    times = table.where(scene="peg_corner").column("step") if table is not None and table.rows else []
+    return f"{times[0]:.2g} µs" if times else ""
+
+
 def _speed(evidence: Evidence, rate: Finding) -> Iterator[str]:
     """Yield the time of a step against the budget of a loop and against MuJoCo, and where Lemke's method is faster."""
-    if step := peg_step(evidence):
+    if step := _peg_step(evidence):
         yield f"A time step of the peg in the corner takes {step}; a loop at 1 kHz allows 1000 µs."
     if (races := rate.tables.get("steps against MuJoCo")) and races.rows:
         ratios = sorted(float(row["ratio"]) for row in hardest(races))

@@ -25,7 +25,6 @@ from reports.pages.builder import (
 )
 from reports.pages.first import LIMIT, facts, made_from
 from reports.pages.formulas import prose
-from reports.pages.quantities import contradictions, unsaid
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import TERMS, explained, readable, terms_of
@@ -305,40 +304,9 @@ def test_the_first_screen_names_our_failures_the_gravest_first_and_what_was_not_
     assert fact.items[0] == ("Miss of exact-energy (1 more on the page exact-energy)", "exact-energy")
 
 
-# Quantities that several pages quote
-
-
-def growth(key, value="1.24", verdict=MIXED):
-    """A topic of one sentence with one quantity, which its answer repeats."""
-    said, given = f"Time of a step grows as the number of bodies to {value}.", ((BODIES, value),)
-    return one(key, Part(said, verdict, quantities=given), said=said, quantities=given)
-
-
-def test_a_second_value_or_verdict_of_any_finding_is_noticed():
-    told = [growth("mechanics"), growth("haptic-rate"), growth("engines")]
-    assert contradictions(Evidence(topics=tuple(told))) == {}
-    for other, found in ((growth("engines", "1.29"), {BODIES: ("1.24", "1.29")}),
-                         (growth("engines", verdict=REPRODUCED), {f"verdict on {BODIES}": ("mixed", "reproduced")}),
-                         (replace(told[0], answer="To 1.29.", quantities=((BODIES, "1.29"),)),
-                          {BODIES: ("1.24", "1.29")})):  # fmt: skip
-        assert contradictions(Evidence(topics=(*told, other))) == found
-        assert contradictions(Evidence(topics=tuple(told), claims=(other,))) == found
-
-
-def test_a_quantity_is_part_of_its_sentence():
-    said = "It grows with the power 1.24; of 11.24 and 1.245 nothing is said."
-    assert Part(said, MIXED, quantities=((BODIES, "1.24"),)).sentence == said
-    with pytest.raises(ArgumentError, match="is part of"):
-        one("k", said="Bodies: 11.24, 1.245 and 1324.", quantities=((BODIES, "1.24"),))
-    with pytest.raises(ArgumentError, match="exponent of bodies"):
-        Part("1", MIXED, quantities=(("exponent of bodys", "1"),))
-
-
-def test_a_quantity_that_is_not_quoted_is_named_and_the_time_of_a_step_is_on_the_first_page():
+def test_the_time_of_a_step_is_on_the_first_page():
     steps = table_from([{"scene": "peg_corner", "step [µs]": 0.4444}])
-    given = (("speed targets", "14 of 18"),)
-    rate = one("haptic-rate", Part("p.", MIXED), said="14 of 18 speed targets met.", quantities=given)
+    rate = one("haptic-rate", Part("p.", MIXED), said="14 of 18 speed targets met.")
     evidence = Evidence(topics=(rate,), inputs={"effect_steps": steps})
-    assert set(unsaid(evidence)) == set(finding.QUANTITIES) - {"time of a peg step", "speed targets"}
     said = "A time step of the peg in the corner takes 0.44 µs; a loop at 1 kHz allows 1000 µs. 14 of 18"
     assert said in build_report(evidence)[FIRST_PAGE]

@@ -232,7 +232,7 @@ def _bodies_say(table: Table) -> Iterator[Part]:
         more = f"; the time grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}"
     yield limited(f"from {LEAST_BODIES} free bodies on, the time of a step grows as the number of bodies to the "
                   "power", power,
-                  LARGEST_POWER, "", more, quantities=(("exponent of bodies", f"{power:.3g}"),))  # fmt: skip
+                  LARGEST_POWER, "", more)  # fmt: skip
     last = rows[-1]
     yield limited("the number of tested pairs of shapes grows as the number of bodies to the power",
                   power_law(bodies, pairs), LARGEST_POWER, "", f" ({last['pairs tested']:.0f} of "

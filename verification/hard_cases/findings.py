@@ -55,8 +55,8 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
     by = {case.title: {part.name: part.sentence for part in case.parts} for case in cases}
     ours = {title: next((found[name] for name in ENGINE if name in found), "") for title, found in by.items()}
     failing = [f"{name}” ({outcome or NOT_TRIED})" for name, outcome in ours.items() if outcome != STABLE]
-    stable = ("hard cases of the engine", f"{len(ours) - len(failing)} of {len(ours)}")
-    sentence = (f"In {stable[1]} hard cases the engine is stable: it gives the known answer and gains no more energy "
+    stable = f"{len(ours) - len(failing)} of {len(ours)}"
+    sentence = (f"In {stable} hard cases the engine is stable: it gives the known answer and gains no more energy "
                 "than rounding or the time step explain." + (f" It fails in “{'; “'.join(failing)}." if failing else "")
     )  # fmt: skip
     verdict = verdict_of_trials(outcome == STABLE for outcome in ours.values())
@@ -65,9 +65,9 @@ def on_hard_cases(cases: Sequence[Finding], failures: Sequence[Failure] = ()) ->
             for case in cases for row in case.tables[case.key].by_title()]  # fmt: skip
     table = EVERY_METHOD.table_of(rows)
     miss = f"{len(failing)} of {len(ours)} hard cases fail{'s' * (len(failing) == 1)}: “{failing[0]}" if failing else ""
-    parts = (Part(sentence, verdict, miss=miss, quantities=(stable,)),)
+    parts = (Part(sentence, verdict, miss=miss),)
     tables = {EVERY_METHOD.key: table.without("note") if rows else table}
-    return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures, (stable,))
+    return finding_of("hard-cases", "Hard cases", question, sentence, parts, tables, failures)
 
 
 def _judged(study: Study, name: str) -> Finding:
