@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
-from reports.figures.labels import arrow_of_time
-from reports.figures.plot import PATH, TIME, Plot
-from reports.figures.style import STYLES, line_arguments
+from reports.figures.plot import PATH, TIME, Plot, note
+from reports.figures.style import MUTED, STYLES, line_arguments
 from verification.scenes import measures
 from verification.scenes.measures import Trace
 from verification.table import titled
@@ -183,7 +182,7 @@ def _path(key: str, runs: Mapping[str, Run]) -> str:
         plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
         plot.axes.xaxis.set_inverted(True)
         plot.axes.yaxis.set_inverted(True)
-        arrow_of_time(plot.axes)
+        note(plot.axes, (x[0], y[0]), "start", (0, 8), fontsize=8, color=MUTED)
     return plot.svg
 
 

@@ -10,10 +10,19 @@ import numpy as np
 from markupsafe import Markup
 
 from reports.figures.figure import Drawn, Panel, cell, grid, recipe, swatch
-from reports.figures.labels import label_marks
 from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot, note
-from reports.figures.style import BLUE, FORCE, INK, MUTED, OUTCOMES, STYLES, LineStyle, looks_of
+from reports.figures.style import (
+    BLUE,
+    FORCE,
+    INK,
+    MUTED,
+    OUTCOMES,
+    STYLES,
+    LineStyle,
+    line_arguments,
+    looks_of,
+)
 from verification.claims.speed import costs_more
 from verification.cost import accuracy
 from verification.cost import trajectories as motion
@@ -346,29 +355,31 @@ def effect_steps(numbers: Table, machine: str) -> Drawn:
 
 
 _NOTHING = 1e-4  # [mm] where an error of zero is drawn
+_COSTS = "time of the step saved [%]", "error [mm]"
+_BEST, _WORSE = (replace(look, name="", width=0.0) for look in (STYLES["IAPB"], OUTCOMES["cannot tell"]))
 
 
 @recipe("effect-costs", "effect_costs")
 def effect_costs(numbers: Table) -> Drawn:
     """Draw a panel per scene."""
-    panels, looks = [], {"yes": STYLES["IAPB"], "no": OUTCOMES["cannot tell"]}
+    panels = []
     for scene in dict.fromkeys(numbers.column("scene")):
-        rows = numbers.where(scene=scene).records()
-        saved = [row["time saved"] for row in rows]
-        places = list(zip(saved, [max(row["error"], _NOTHING) for row in rows], strict=True))
-        best, others = ([place for place, row in zip(places, rows, strict=True) if row["best of its error"] == kind]
-                        for kind in looks)  # fmt: skip
-        with Plot(f"effect-costs-{scene}", (4.6, 3.6)) as plot:
-            plot.curve(sorted(best), looks["yes"], linewidth=0.8)
-            plot.marks(others, looks["no"])
-            least, span = min(0.0, *saved), max(saved) - min(0.0, *saved)
-            plot.log("time of the step saved [%]", "error [mm]", "y", xlim=(least - 0.62 * span, least + 1.4 * span))
-            plot.axes.set_xticks([x for x in plot.axes.get_xticks() if least <= x <= least + 1.4 * span])
-            plot.axes.margins(y=0.12)
-            plot.axes.yaxis.get_major_locator().set_params(numticks=8)
-            plot.axes.yaxis.set_major_formatter(lambda y, _: power_of_ten(y) if y > _NOTHING else "none")
-            label_marks(plot.axes, [row["effect"].replace("_", " ") for row in rows], places,
-                        [looks[row["best of its error"]].color for row in rows])
-        names = ", ".join(row["effect"] for row in rows)
-        panels.append(Panel(plot.svg, f"{scene}: error against time saved for {names}.", scene))
-    return Drawn(panels, numbers)
+        rows = sorted(numbers.where(scene=scene).records(), key=lambda row: float(row["time saved"]))
+        places = range(len(rows))
+        size = 6.4, 0.8 + 0.22 * len(rows)
+        with Plot(f"effect-costs-{scene}", size, shape=(1, 2)) as plot:
+            for axes, key, title in zip(plot.each, ("time saved", "error"), _COSTS, strict=True):
+                for place, row in zip(places, rows, strict=True):
+                    look = line_arguments(_BEST if row["best of its error"] == "yes" else _WORSE)
+                    axes.plot(max(row[key], _NOTHING) if key == "error" else row[key], place, **look)
+                axes.set(xlabel=title, ylim=(-0.6, len(rows) - 0.4))
+                axes.set_yticks(places, [])
+            plot.axes.set_yticks(places, [row["effect"].replace("_", " ") for row in rows])
+            errors = plot.each[1]
+            errors.set_xscale("log")
+            errors.xaxis.get_major_locator().set_params(numticks=6)
+            errors.xaxis.set_major_formatter(lambda x, _: power_of_ten(x) if x > _NOTHING else "none")
+        names = ", ".join(row["effect"] for row in rows[::-1])
+        panels.append(Panel(plot.svg, f"{scene}: time saved and error for {names}.", scene))
+    legend = {"saves most for its error": _BEST, "another saves more": _WORSE}
+    return Drawn(panels, numbers, legend)

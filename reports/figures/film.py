@@ -1,15 +1,14 @@
-"""Films of planar runs: animated SVG that the browser plays; the page's script adds a slider.
+"""The film of the peg in the corner: animated SVG that the browser plays; the page's script adds a slider.
 
 Each body is a group whose place and angle follow the poses of a run (`animateTransform`) at a few hundred moments. The
 moments are evenly spaced in time; those around the first impacts are added. Contacts and impulses are marks that are
-visible from one moment to the next. A picture has SIZE units, y down.
+visible from one moment to the next. A picture has SIZE units; as in the paper, x is to the left and y down.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from iapb.run import Run
 from reports.figures.corner import UNLIMITED
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.geometry import Floats, body_outlines, bounds, is_turned, outline, wall_outlines, widened
+from reports.figures.geometry import Floats, body_outlines, bounds, outline, wall_outlines, widened
 from reports.figures.style import BLUE, FORCE, INK, PEG, WALL, css
 from verification.table import titled
 
@@ -29,17 +28,10 @@ _LASTS, _SLOWER = 5.0, (1, 2, 5, 10, 20, 50)  # seconds that a film takes at lea
 _BEFORE = 0.03  # a film begins so long before the first contact [s]
 _STRONGEST = 12  # contacts marked at a moment
 
-FILMS: Mapping[str, Mapping[str, str]] = {  # key of the figure -> its runs by the label of their panel
-    "film-corner": UNLIMITED,
-    "film-hole": {"IAPB": "hole/IAPB"},
-    "film-two-link-arm": {"IAPB": "plane/two_link_arm"},
-    "film-cradle": {"IAPB": "plane/cradle"},
-    "film-pushing": {"IAPB": "group/IAPB"},
-}
 
-
-def _film(key: str, *runs: Run) -> Drawn:
-    """Draw the runs of a film side by side, at the same scale and speed."""
+@recipe("film-corner", *UNLIMITED.values())
+def film_corner(*runs: Run) -> Drawn:
+    """Draw the runs of the peg in the corner side by side, at the same scale and speed."""
     end = max(float(run.time[-1]) for run in runs)
     slower = next((each for each in _SLOWER if each * end >= _LASTS), _SLOWER[-1])
     low, high = bounds_of(runs)
@@ -47,29 +39,22 @@ def _film(key: str, *runs: Run) -> Drawn:
     start = max(min(touching, default=0.0) - _BEFORE, 0.0)
     head = f'data-duration="{end:g}" data-slower="{slower}" data-start="{start:.4g}"'
     panels, rows = [], []
-    for label, run in zip(FILMS[key], runs, strict=True):
+    for world, run in zip(UNLIMITED, runs, strict=True):
         film = Film(run, low, SIZE[0] / float(high[0] - low[0]), end, slower)
-        alt = f"{run.scene_resolved['title']}, in the world {label}: a film of {end:.2f} s, {slower} times slower."
+        alt = f"{run.scene_resolved['title']}, in the world {world}: a film of {end:.2f} s, {slower} times slower."
         svg = (f'<svg viewBox="0 0 {SIZE[0]} {SIZE[1]}" xmlns="http://www.w3.org/2000/svg" {head} '
                f'style="max-width: 620px">{film.walls()}{"".join(film.bodies())}{"".join(film.marks())}</svg>')
-        panels.append(Panel(svg, alt, label, film=True))
-        rows.append((label, float(run.time[-1]), run.steps, len(run.contacts.gap), len(run.impacts.step)))
+        panels.append(Panel(svg, alt, world, film=True))
+        rows.append((world, float(run.time[-1]), run.steps, len(run.contacts.gap), len(run.impacts.step)))
     titles = ("world", "simulated [s]", "steps", "contacts, summed over the steps", "impacts")
     return Drawn(panels, titled(titles, rows, digits=3))
 
 
-RECIPES = tuple(recipe(key, *runs.values())(partial(_film, key)) for key, runs in FILMS.items())
-
-
 def bounds_of(runs: Sequence[Run]) -> tuple[Floats, Floats]:
-    """Return the corners [m] of a picture that contains all bodies at all times, turned as the scene's drawing is."""
-    points = [_sign(run) * corners for run in runs for step in _moments(run, _MARKED)
+    """Return the corners [m] of a picture that contains all bodies at all times, x to the left and y down."""
+    points = [-corners for run in runs for step in _moments(run, _MARKED)
               for corners in body_outlines(run.scene_resolved, run.pose[step])]
     return widened(*bounds(points, _MARGIN), SIZE[0] / SIZE[1])
-
-
-def _sign(run: Run) -> float:
-    return -1.0 if is_turned(run.scene_resolved) else 1.0
 
 
 def _moments(run: Run, count: int) -> Floats:
@@ -92,7 +77,7 @@ class Film:
 
     def flat(self, points: Any) -> Floats:
         """Return the picture coordinates of points (..., 2) [m]."""
-        x, y = np.moveaxis(_sign(self.run) * np.asarray(points, dtype=float)[..., :2] - self.corner, -1, 0)
+        x, y = np.moveaxis(-np.asarray(points, dtype=float)[..., :2] - self.corner, -1, 0)
         return np.stack([self.scale * x, SIZE[1] - self.scale * y], axis=-1)
 
     def walls(self) -> str:
@@ -103,17 +88,15 @@ class Film:
         return f'<path fill="{css(WALL)}" d="{rings}"/>'
 
     def bodies(self) -> Iterator[str]:
-        """Yield the bodies; a circle has a spoke that shows how it turns."""
+        """Yield the bodies."""
         steps = _moments(self.run, _MOMENTS)
         shares = self.run.time[steps] / self.end
         shares[-1] = 1.0  # a run that ended early stays as it is
         times = [f"{share:.4f}".rstrip("0").rstrip(".") for share in shares]
-        own = self.scale * _sign(self.run) * np.array([1.0, -1.0])
+        own = self.scale * np.array([-1.0, 1.0])
         look = f'fill="{css(PEG)}" stroke="{css(INK)}" stroke-width="1.6" fill-opacity="0.8"'
         for k, body in enumerate(self.run.scene_resolved["bodies"]):
             rings = [own * outline(shape) for shape in body["shapes"]]
-            rings += [own * (np.array(shape["center"])[:2] + [[0.0, 0.0], [shape["radius"], 0.0]])
-                      for shape in body["shapes"] if shape["kind"] == "circle"]
             places = [f"{x:.1f} {y:.1f}" for x, y in self.flat(self.run.pose[steps, k, :2])]
             turns = [f"{angle:.1f}" for angle in -np.degrees(self.run.pose[steps, k, 2])]
             moved, turned = (self.animated("translate", places, times), self.animated("rotate", turns, times))
@@ -155,7 +138,7 @@ class Film:
         if color == FORCE:
             arm = round(6 + 8 * size)
             return f"M{x:.1f} {y:.1f}m-{arm} 0h{2 * arm}m-{arm}-{arm}v{2 * arm}"
-        nx, ny = (6 + 26 * size) * _sign(self.run) * self.run.contacts.normal[row][:2]
+        nx, ny = -(6 + 26 * size) * self.run.contacts.normal[row][:2]
         return f"M{x:.1f} {y:.1f}m-1-1h2v2h-2zm1 1l{nx:.0f} {-ny:.0f}"
 
 

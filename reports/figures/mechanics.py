@@ -99,7 +99,7 @@ def _balls(problem: str, found: Sequence[Outcome]) -> str:
                 axes.add_patch(Circle(center, 0.5, facecolor=PAPER, edgecolor=MUTED, linewidth=1.0, zorder=2))
                 if max(abs(v) for v in velocity) > ROUNDING:
                     arrow(axes, center, [1.6 * v for v in velocity], color=color, width=1.8, head=10.0)
-            note(axes, (middle, up[1] - 0.45), outcome.label, color=color, fontsize=8.5, gid="name=")
+            note(axes, (middle, up[1] - 0.45), outcome.label, color=color, fontsize=8.5)
             changed = [f"{name} changed ×{change:.2g}" for name, change in zip(("energy", "momentum"), outcome[3:],
                        strict=True) if abs(change) >= ROUNDING]  # fmt: skip
             note(axes, (middle, up[0] + 0.3), ", ".join(changed) or "all kept", color=FORCE if changed else INK,

@@ -114,7 +114,7 @@ def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
         for (name, distance), color in zip(CONTACTS.items(), (BLUE, VERMILION), strict=True):  # opposite to the motion
             point, normal = poses[1].of((distance, 0.0)), -poses[1].rotation[:2, 1]
             arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
-            note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right", gid="name=")
+            note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right")
     words = ", ".join(f"{name} is {distance} m along the second link" for name, distance in CONTACTS.items())
     return Drawn([Panel(canvas.svg, f"Two links in a straight line from a fixed pivot; {words}.")])
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from reports.figures.geometry import Floats, body_outlines, body_placements, wall_outlines, widened
-from reports.figures.labels import name_curves, note_beside
 from reports.figures.numbers import power_of_ten
 from reports.figures.style import (
     FORCE,
@@ -29,6 +28,7 @@ from reports.figures.style import (
 
 TIME, PATH = "time", "path"  # the cursor reads curves over time
 TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
+_BEHIND = 10.0  # points from the tail of an arrow to the middle of its name
 LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
 
 
@@ -47,7 +47,7 @@ class Plot:
     Attributes
     ----------
     axes, each, drawing : matplotlib's (first) axes, all of them, and the figure
-    words : text after the name of each curve
+    words : text after the name of a curve, in a legend above the axes
     svg : the SVG of the panel
     """
 
@@ -78,10 +78,17 @@ class Plot:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:  # fmt: skip
         if error is None:
-            if len(self.each) == 1:
-                name_curves(self.axes, self.words)
+            if self.words:
+                self._add_legend()
             self.svg = self._traced() if self.kind else to_svg(self.drawing, self.key)
         self._style.__exit__(kind, error, trace)
+
+    def _add_legend(self) -> None:
+        """Write the name of each curve that has words, and these, above the axes."""
+        curves = {line.get_gid(): line for line in self.axes.lines}
+        lines = [curves[f"curve={name}"] for name in self.words]
+        texts = [name + words for name, words in self.words.items()]
+        self.drawing.legend(lines, texts, loc="outside upper left", fontsize=8)
 
     def _traced(self) -> str:
         """Return the SVG with what the page's script reads values with: the frame in points, limits and names."""
@@ -165,15 +172,17 @@ class Canvas(Plot):
             self.axes.fill(*corners.T, facecolor=PEG, edgecolor=INK, linewidth=1.1, zorder=2)
 
     def hand(self, scene: Mapping[str, Any], pose: Floats | None, length: float) -> None:
-        """Draw the hand's force as an arrow of the given length [m] from the point that it holds; call it last."""
+        """Draw the hand's force as an arrow of the given length [m] from the point that it holds."""
         if scene["hand"] and np.any(force := np.asarray(scene["hand"]["force"][:2], dtype=float)):
             start = body_placements(scene, pose)[scene["hand"]["body"]].of(scene["hand"]["point"])[:2]
             self.named_arrow(start, length * force / np.hypot(*force), "hand")
 
     def named_arrow(self, start: Floats, vector: Floats, name: str) -> None:
-        """Draw an arrow and its name, which is placed where nothing is drawn yet."""
+        """Draw an arrow and its name, behind its tail."""
         arrow(self.axes, start, vector)
-        note_beside(self.axes, start, start + vector, name, 10, color=FORCE)
+        on_paper = self.axes.transData.transform([start, start + vector])
+        way = np.subtract(*on_paper)
+        note(self.axes, start, name, tuple(_BEHIND * way / np.hypot(*way)), color=FORCE)
 
     def scale_bar(self, start: tuple[float, float], length: float, text: str) -> None:
         """Draw a scale bar to the right of `start`, with its text above it."""
@@ -215,7 +224,7 @@ def _styled_once(run: re.Match[str]) -> str:
 _CLEANED: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     # a <style> would leak into the page
     (r"(?s)(?:<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>)\s*", ""),
-    (r'\sid="(curve|name)=([^"]*)"', r' data-\1="\2"'),  # what a gid tells the page's script
+    (r'\sid="curve=([^"]*)"', r' data-curve="\1"'),  # what a gid tells the page's script
     # coordinates are inside of tags; the numbers between them are for people
     (r"<[^>]+>", lambda tag: _NUMBER.sub(lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])),
     (r'\stransform="rotate\(-?0 [^)]*\)"', ""),

@@ -231,14 +231,14 @@ def of_effects(patch, folder, failures):
 
 
 def of_runs(patch, folder, failures):
-    patch.setattr(runs, "FIGURE_RUNS", {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "hole/IAPB")})
+    patch.setattr(runs, "FIGURE_RUNS", {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "group/IAPB")})
     patch.setattr(runs, "shipped_scene", broken(runs.shipped_scene, lambda name, values: name == "peg_hole"))
     assert list(runs.figure_runs(Runner(folder), nothing, failures)) == ["corner/IAPB"]
 
 
 @pytest.mark.parametrize(("stage", "failed"), [
     (of_claims, ["C01", "C07, uniform rods, 0.0, 0.1", "C07, point masses at the ends of the links, 0.0, 0.1"]),
-    (of_effects, ["peg_corner, impulses", "arm_pushing"]), (of_runs, ["hole/IAPB"]),
+    (of_effects, ["peg_corner, impulses", "arm_pushing"]), (of_runs, ["group/IAPB"]),
 ])  # fmt: skip
 def test_a_case_that_raises_costs_its_row_only(stage, failed, monkeypatch, tmp_path):
     failures = []

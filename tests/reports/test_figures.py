@@ -9,23 +9,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from matplotlib.axes import Axes
-from matplotlib.cbook import STEP_LOOKUP_MAP
-from matplotlib.path import Path
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 
 from iapb.scene import find_scene, load_scene, scene_names
 from iapb.system import System
 from reports.evidence.runs import TILTED
-from reports.figures import RECIPES, energy_gains, plot
+from reports.figures import RECIPES, energy_gains
 from reports.figures.condition_map import condition_map
 from reports.figures.corner import UNLIMITED
 from reports.figures.figure import draw, standalone
 from reports.figures.geometry import body_placements, is_spatial, solids
-from reports.figures.labels import arrow_of_time, label_marks, name_curves
 from reports.figures.mechanics import BERNOULLI, CRADLE, outcomes
 from reports.figures.numbers import format_number
 from reports.figures.paper import arm_energies
@@ -118,9 +111,9 @@ def precision_rows():
 
 
 def all_inputs():
-    """Return the inputs of all figures but those of scenes in space and some films: made up or computed at once."""
+    """Return the inputs of all figures: made up or computed at once."""
     needed = sorted({name for recipe in RECIPES for name in recipe.needs})
-    scenes = {"corner": "peg_corner", "device": "peg_corner", "hole": "peg_hole", "group": "arm_pushing",
+    scenes = {"corner": "peg_corner", "device": "peg_corner", "group": "arm_pushing",
               "wall": "wall_1d"}
     runs = {name: made_motion(scenes[name.split("/")[0]], k) for k, name in enumerate(needed)
             if name.split("/")[0] in scenes}  # fmt: skip
@@ -132,81 +125,43 @@ def all_inputs():
             "machine": "a processor, report of today"}
 
 
-def crossed(axes):
-    """Return the names at curves that a line runs through, or another name covers."""
-    axes.figure.draw_without_rendering()
-    boxes = {text.get_text(): Text.get_window_extent(text) for text in axes.texts
-             if text.get_text() and str(text.get_gid()).startswith("name=")}  # fmt: skip
-    lines = [line for line in axes.lines if line.get_linestyle() != "None" and (line.get_alpha() or 1.0) > 0.3]
-    values = [STEP_LOOKUP_MAP[line.get_drawstyle()](*np.asarray(line.get_xydata(), dtype=float).T) for line in lines]
-    paths = [line.get_transform().transform_path(Path(np.column_stack(value)))
-             for line, value in zip(lines, values, strict=True)]  # fmt: skip
-    cores = {name: Bbox.from_extents(box.x0 + 1, box.y0 + box.height / 4, box.x1 - 1, box.y1 - box.height / 4)
-             for name, box in boxes.items()}  # fmt: skip
-    return [name for name, core in cores.items()
-            if any(path.intersects_bbox(core, False) for path in paths)
-            or any(core.overlaps(other) for own, other in cores.items() if own != name)]  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def gallery():
-    """All figures by key; the lines drawn for them, and (figure, name at a curve) where a line crosses the name."""
-    made, key, plotted = SimpleNamespace(inputs=all_inputs(), figures={}, lines=[], struck=[]), "", Axes.plot
+    """All figures by key, and the lines drawn for them."""
+    made, plotted = SimpleNamespace(inputs=all_inputs(), figures={}, lines=[]), Axes.plot
 
     def noted(axes, *args, **how):
         lines = plotted(axes, *args, **how)
         made.lines.extend(lines)
         return lines
 
-    def named(axes, *words):
-        name_curves(axes, *words)
-        made.struck.extend((key, each) for each in crossed(axes))
-
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Axes, "plot", noted)
-        patch.setattr(plot, "name_curves", named)
         for recipe in RECIPES:
-            key = recipe.key
-            made.figures[key] = draw(recipe, made.inputs)
+            made.figures[recipe.key] = draw(recipe, made.inputs)
     made.drawn = [figure for figure in made.figures.values() if figure.panels]
     return made
 
 
-@pytest.fixture(params=[recipe.key for recipe in RECIPES if recipe.key not in ("film-two-link-arm", "film-cradle")])
+@pytest.fixture(params=[recipe.key for recipe in RECIPES])
 def figure(request, gallery):
     return gallery.figures[request.param]
 
 
-def test_every_figure_is_drawn_that_has_its_inputs_and_no_line_and_no_other_name_covers_a_name(gallery):
-    absent = {key for key, figure in gallery.figures.items() if not figure.panels}
-    assert absent == {"film-two-link-arm", "film-cradle"}
+def test_every_figure_is_drawn_that_has_its_inputs(gallery):
+    assert all(figure.panels for figure in gallery.figures.values())
     assert all(draw(recipe, {}).missing == recipe.needs for recipe in RECIPES)
-    assert len({recipe.key for recipe in RECIPES}) == len(RECIPES) and gallery.struck == []
+    assert len({recipe.key for recipe in RECIPES}) == len(RECIPES)
 
 
-@settings(max_examples=15, deadline=None)
-@given(st.lists(st.tuples(st.floats(0.1, 0.9), st.floats(-0.7, 0.7)), min_size=2, max_size=4, unique=True))
-def test_names_of_curves_and_marks_cover_nothing(lines):
-    x = np.linspace(0.0, 1.0, 50)
+def test_words_of_curves_stand_in_a_legend_above_the_axes():
     with Plot("any") as plot:
-        plot.axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
-        for number, (height, slope) in enumerate(lines):
-            plot.axes.plot(x, height + slope * (x - 0.5), gid=f"curve={number} name")
-        label_marks(plot.axes, ["a long name"], [(0.5, 0.5)], ["black"])
-        name_curves(plot.axes)
-        assert crossed(plot.axes) == []
-        for text in plot.axes.texts:
-            box, frame = Text.get_window_extent(text), plot.axes.get_window_extent()
-            assert frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
-
-
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_the_arrow_of_time_points_along_the_path(way):
-    with Plot("any") as plot:
-        plot.axes.plot(way * np.linspace(0.0, 1.0, 50), way * np.linspace(0.0, 2.0, 50))
-        arrow_of_time(plot.axes)
-        tip, tail = (np.asarray(end) for end in (plot.axes.texts[0].xy, plot.axes.texts[0].xyann))
-    assert (way * (tip - tail) > 0.0).all()
+        for name in ("one", "two"):
+            plot.curve([(0.0, 1.0), (1.0, 2.0)], replace(STYLES["IAPB"], name=name))
+            plot.words[name] = f": {len(name)} letters"
+    (legend,) = plot.drawing.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["one: 3 letters", "two: 3 letters"]
+    assert legend.get_window_extent().y0 >= plot.axes.get_window_extent().y1
 
 
 def test_a_name_has_one_colour_and_one_marker_in_every_figure(gallery):
@@ -226,18 +181,17 @@ def test_a_name_has_one_colour_and_one_marker_in_every_figure(gallery):
             assert (look.color, look.marker) == (STYLES.get(text, look).color, STYLES.get(text, look).marker), text
 
 
-def test_a_plot_has_at_most_six_series_each_named_at_its_curve_in_a_style_of_its_own(figure):
+def test_a_plot_has_at_most_six_series_each_named_in_the_legend_in_a_style_of_its_own(figure):
     styles = [(look.marker, look.dash, look.filled, look.width > 0) for _, look in figure.legend if look.name]
     assert len(set(styles)) == len(styles)  # even without their colour
     for panel in figure.panels:
         names = set(re.findall(r'data-curve="([^"]+)"', panel.svg))
         assert len(names) <= MOST_SERIES
-        written = re.findall(r">([^<>]+)</text>", panel.svg)
-        for name in names if len(names) > 1 else ():
-            assert any(text.startswith(name) for text in written), (panel.label, name)
+        named = [text for text, look in figure.legend] + [look.name for text, look in figure.legend]
+        assert len(names) == 1 or names <= set(named), panel.label
 
 
-@pytest.mark.parametrize("key", ["hero", "fig05", "every-scene", "film-hole", "effect-costs"])
+@pytest.mark.parametrize("key", ["hero", "fig05", "every-scene", "film-corner", "effect-costs"])
 def test_a_drawing_repeats_byte_for_byte(key, gallery):
     again = draw(next(recipe for recipe in RECIPES if recipe.key == key), gallery.inputs)
     assert again.panels and again.panels == gallery.figures[key].panels

@@ -52,8 +52,8 @@ document.querySelectorAll("figure").forEach((figure) => {
     button.append(...[...entry.childNodes].slice(0, -1));
     button.addEventListener("click", () => {
       button.ariaPressed = `${button.ariaPressed !== "true"}`;
-      figure.querySelectorAll("svg [data-curve], svg [data-name]").forEach((part) => {
-        if ([part.dataset.curve, part.dataset.name].includes(entry.dataset.curve)) part.toggleAttribute("hidden", button.ariaPressed !== "true");
+      figure.querySelectorAll("svg [data-curve]").forEach((part) => {
+        if (part.dataset.curve === entry.dataset.curve) part.toggleAttribute("hidden", button.ariaPressed !== "true");
       });
     });
   });
