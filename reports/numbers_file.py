@@ -45,7 +45,7 @@ def collect_numbers(evidence: Evidence, figures: Iterable[Figure], depth: str) -
     for figure in figures:
         if figure.numbers is not None and all(figure.numbers is not table for table in tables.values()):
             tables[f"figures/{figure.key}"] = figure.numbers
-    runs = {entry.command: entry.content_hash for entry in evidence.manifest if entry.used_by}
+    runs = {run.command: run.content_hash for run in evidence.runs}
     return ReportNumbers(tables, runs, dict(evidence.provenance), depth)
 
 

@@ -56,7 +56,7 @@ def _facts() -> dict[str, str]:
     return {
         "version": package_version("iapb"),
         "commit": _git("rev-parse", "HEAD") or UNKNOWN,
-        "dirty": _dirty(),
+        "uncommitted changes": uncommitted_changes(),
         "lock": lock_hash(),
         "python": f"{platform.python_implementation()} {platform.python_version()}",
         "system": f"{platform.system()} {platform.machine()}",
@@ -126,44 +126,40 @@ def machine_parts(facts: Mapping[str, str]) -> dict[str, str]:
     return {"cpu": facts.get("cpu", ""), "BLAS kernel": " and ".join(kernels), "CPU features of numpy": simd}
 
 
-def machine_of(facts: Mapping[str, str]) -> str:
-    """Return `machine_parts` as one text."""
-    return ", ".join(text for text in machine_parts(facts).values() if text)
-
-
 @cache
 def this_machine() -> str:
-    """Return `machine_of` for this process; it is part of the keys of computed stages."""
-    return machine_of({"cpu": processor(), "blas": linear_algebra(), "simd": dispatched()})
+    """Return `machine_parts` of this process as one text; it is part of the keys of computed stages."""
+    parts = machine_parts({"cpu": processor(), "blas": linear_algebra(), "simd": dispatched()})
+    return ", ".join(text for text in parts.values() if text)
 
 
 # Files that can change a result; changes of other files are ignored.
 _TRACED = ("iapb", "reference", "verification", "reports", "scenes", "requirements.lock", "pyproject.toml")
 
 
-def _dirty() -> str:
-    status = _git("status", "--porcelain", "--", *_TRACED)
-    return UNKNOWN if status is None else str(bool(status)).lower()
+def uncommitted_changes() -> str:
+    """Return a hash of the uncommitted changes of sources, scenes and lock, new files among them.
 
-
-def uncommitted_changes() -> str | None:
-    """Return the uncommitted changes of the sources, the scenes and the lock, including new files, as a patch.
-
-    The patch is empty without changes, and None without git or without a checkout.
+    It is "none" without changes, and ``unknown`` without git or without a checkout.
     """
-    changed, new = _git("diff", "HEAD", "--", *_TRACED), _git("ls-files", "--others", "--exclude-standard", *_TRACED)
+    changed = _git("diff", "HEAD", "--", *_TRACED)
+    new = _git("ls-files", "--others", "--exclude-standard", "--", *_TRACED)
     if changed is None or new is None:
-        return None
-    added = [_git("diff", "--no-index", "/dev/null", name, fine=(0, 1)) or "" for name in new.splitlines()]
-    return "\n".join(part for part in (changed, *added) if part)
+        return UNKNOWN
+    if not changed and not new:
+        return "none"
+    digest = hashlib.sha256(changed.encode())
+    for name in new.splitlines():
+        digest.update(name.encode() + b"\0" + (_ROOT / name).read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
-def _git(*arguments: str, fine: tuple[int, ...] = (0,)) -> str | None:
-    """Return git's output for the checkout; None without git or checkout, or if the exit status is not in `fine`."""
+def _git(*arguments: str) -> str | None:
+    """Return git's output for the checkout; None without git or checkout, or if git fails."""
     if not (_ROOT / ".git").exists():
         return None
     with suppress(OSError, subprocess.SubprocessError):
         done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, timeout=20,
                               check=False)  # fmt: skip
-        return done.stdout.strip() if done.returncode in fine else None
+        return done.stdout.strip() if done.returncode == 0 else None
     return None

@@ -1,4 +1,4 @@
-"""Write the report: a first page, a page for each section, an archive of all pages, and the files beside them.
+"""Write the report: a first page, a page for each section, and the files beside them.
 
     evidence = Evidence(inputs=..., claims=..., ...)
     pages = build_report(evidence, draw_all(evidence))
@@ -9,69 +9,49 @@ A report whose sources, results and files have not changed is not made again: it
 
 from __future__ import annotations
 
-import io
 import json
-import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from iapb.errors import ArgumentError
-from reports.crate import write_crate
+from reports.crate import CRATE_NAME, write_crate
 from reports.evidence.depends import FOLDERS, PACKAGES, depends_of, folder_hash
 from reports.figures.figure import Figure
 from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.builder import FIRST_PAGE
 from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
-from reports.provenance import PEERS, collect_provenance, uncommitted_changes
+from reports.provenance import PEERS, collect_provenance
 from reports.store.io import write_whole
 from reports.store.keys import evidence_version, hash_of, plain, sources_hash
 
-LARGEST_FIRST, LARGEST_ARCHIVE = 1_000_000, 4_000_000  # bytes: a report that cannot be mailed is not read
-ARCHIVE_NAME, DIRTY_NAME = "report.zip", "dirty.diff"
+LARGEST_FIRST = 1_000_000  # bytes: a first page that cannot be mailed is not read
+_WRITTEN = (FIRST_PAGE, *(section.page for section in SECTIONS), NUMBERS_NAME, CRATE_NAME)
 ANSWER = "tables/answer.json"  # what the command said of the finished report
-_TEXTS = {
-    FIRST_PAGE: "the report's first page",
-    **{section.page: f"the report: {section.title}" for section in SECTIONS},
-    ARCHIVE_NAME: "all pages of the report",
-    NUMBERS_NAME: "every number of the report, for iapb report diff and iapb reproduce --check",
-    DIRTY_NAME: "how the sources differed from the commit",
-}
 
 
 def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
-    """Write each page and their archive atomically, the first page last; return the path of the first page.
+    """Write each page atomically, the first page last; return the path of the first page.
 
     Raises
     ------
     ArgumentError
-        The first page is larger than LARGEST_FIRST, or the archive is larger than LARGEST_ARCHIVE.
+        The first page is larger than LARGEST_FIRST.
     """
-    contents, packed = {name: page.encode() for name, page in pages.items()}, io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as file:
-        for name in sorted(contents):  # without times: equal pages give equal bytes
-            file.writestr(zipfile.ZipInfo(name), contents[name], zipfile.ZIP_DEFLATED)
-    contents = {ARCHIVE_NAME: packed.getvalue(), **contents}
-    for what, name, largest in (("the first page", FIRST_PAGE, LARGEST_FIRST),
-                                ("the archive", ARCHIVE_NAME, LARGEST_ARCHIVE)):  # fmt: skip
-        if len(contents[name]) > largest:
-            raise ArgumentError(what, f"{len(contents[name])} bytes", f"at most {largest} bytes")
-    for name in sorted(contents, key=FIRST_PAGE.__eq__):
-        write_whole(Path(folder) / name, contents[name])
+    size = len(pages[FIRST_PAGE].encode())
+    if size > LARGEST_FIRST:
+        raise ArgumentError("the first page", f"{size} bytes", f"at most {LARGEST_FIRST} bytes")
+    for name in sorted(pages, key=FIRST_PAGE.__eq__):
+        write_whole(Path(folder) / name, pages[name])
     return Path(folder) / FIRST_PAGE
 
 
 def write_companions(out: Path, evidence: Evidence, figures: Iterable[Figure], depth: str) -> tuple[Path, ...]:
-    """Write the numbers, the uncommitted changes if there are any, and last the RO-Crate metadata; return the files."""
-    written, changed = [write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))], out / DIRTY_NAME
-    changed.unlink(missing_ok=True)
-    if changes := uncommitted_changes():
-        write_whole(changed, changes + "\n")
-        written.append(changed)
-    beside = {name: text for name, text in _TEXTS.items() if (out / name).is_file()}
-    return (*written, write_crate(out, beside, evidence.manifest, evidence.provenance))
+    """Write the numbers and the RO-Crate metadata; return the files."""
+    numbers = write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))
+    return numbers, write_crate(out, evidence.provenance)
 
 
 def report_key(out: Path, depth: str) -> str:
@@ -79,7 +59,7 @@ def report_key(out: Path, depth: str) -> str:
     folder = Path(__file__).parent / "pages"
     return hash_of({
         "folder": str(out.absolute()), "depth": depth, "code": [evidence_version(), sources_hash("reports")],
-        "pages": [folder_hash(folder / part) for part in ("templates", "scripts")], "changes": uncommitted_changes(),
+        "pages": [folder_hash(folder / part) for part in ("templates", "scripts")],
         "depends": {stage: depends_of(stage) for stage in (*FOLDERS, *PACKAGES, "proofs")},
         "facts": collect_provenance(packages=PEERS),
     })  # fmt: skip
@@ -87,7 +67,7 @@ def report_key(out: Path, depth: str) -> str:
 
 def keep_answer(out: Path, key: str, facts: Mapping[str, Any], lines: Sequence[str], made_from: Iterable[str]) -> None:
     """Keep the answer of a finished report and the state of its files; paths are relative to `out`."""
-    kept = {"key": key, "facts": facts, "lines": lines, "files": _states(out, (*made_from, *_TEXTS))}
+    kept = {"key": key, "facts": facts, "lines": lines, "files": _states(out, (*made_from, *_WRITTEN))}
     write_whole(out / ANSWER, json.dumps(plain(kept)))
 
 

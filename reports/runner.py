@@ -14,9 +14,8 @@ from iapb.scene import Scene
 from iapb.simulation import require_complete, simulate
 from iapb.worlds import find_world
 from reference.one_thread import one_thread
-from reports.provenance import machine_of, this_machine
 from reports.store.folder import Place, RunStore
-from reports.store.runs import RunEntry, read_provenance
+from reports.store.runs import RunEntry
 from reports.uses import StoredFile, run_command
 
 Progress = Callable[[int, int], None]
@@ -39,7 +38,6 @@ class Runner:
         self.user = ""  # the user recorded for the runs requested now
         self._held: dict[str, tuple[Run, RunEntry]] = {}
         self._known: dict[str, StoredFile] = {}
-        self._made_here: set[str] = set()
         self._places: dict[tuple[int, str, str, int], tuple[Place, Scene]] = {}
 
     def __call__(
@@ -52,8 +50,6 @@ class Runner:
         """
         place = self.place_of(scene, world, rendering)
         name = place.path.name
-        if not place.path.is_file():
-            self._made_here.add(name)
         run, entry = self._held.get(name) or self.fetch(scene, world, rendering)
         if keep and run.complete:
             self._held[name] = run, entry
@@ -117,11 +113,7 @@ class Runner:
         name = self.file_of(scene, world, rendering)
         if name not in self._known or self._known[name].file != entry.file:  # a partial run has another file
             command = run_command(scene, world, rendering) or f"iapb store again out/runs/{entry.file}"
-            path = self.store.folder / entry.file
-            machine = this_machine() if name in self._made_here else machine_of(read_provenance(path))
-            self._known[name] = StoredFile(self.label(scene, world, rendering), entry.file, entry.run_key,
-                                           entry.content_hash, command, path.stat().st_size, status=entry.status,
-                                           made_on=machine)  # fmt: skip
+            self._known[name] = StoredFile(entry.file, entry.content_hash, command)
 
     @staticmethod
     def label(scene: Scene, world: str, rendering: str = "full") -> str:

@@ -1,4 +1,4 @@
-"""The files that a result was made from, and the command that reproduces each run."""
+"""The runs that a result was made from, and the command that reproduces each run."""
 
 from __future__ import annotations
 
@@ -18,27 +18,18 @@ from iapb.scene.model import set_value
 
 @dataclass(frozen=True)
 class StoredFile:
-    """A run or table file that was read or written for a result; a line of the report's manifest.
+    """A run that was read or written for a result.
 
-    name : of a run: scene, world and rendering
-    file : name within the folder of runs; in the manifest, the path from the folder of the report
-    key, content_hash : hash of what determines the content, and hash of the content
-    command : reproduces the file
-    size : size of the file [bytes]
-    used_by : the claims, topics and figure inputs that used a run; empty for a table
-    status : "complete", "partial" if the simulation gave up, "absent" if the file was removed later
-    made_on : processor, BLAS kernel and optional numpy code of the computation, if the file states them
+    file : name within the folder of runs
+    content_hash : hash of the results
+    command : reproduces the run
+    used_by : the claims, topics and figure inputs that used it
     """
 
-    name: str
     file: str
-    key: str
     content_hash: str
     command: str
-    size: int = 0
     used_by: tuple[str, ...] = ()
-    status: str = "complete"
-    made_on: str = ""
 
 
 def run_command(scene: Scene, world: str, rendering: str = "full") -> str:

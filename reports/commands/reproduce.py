@@ -69,25 +69,26 @@ def make_report(out: Path, depth: str) -> Answer:
     path = write_report(out, build_report(evidence, figures))
     failed = evidence.failed + failed_cases(out / "tables", {"figures": undrawn})
     beside = write_companions(out, evidence, figures, depth)
-    ended, files = time.perf_counter(), len(evidence.manifest)
+    ended = time.perf_counter()
     took = {**evidence.seconds, "figures and page": ended - gathered}
     counts = count_claims(evidence.claims)
     lines = [
         *([f"Of {len(evidence.claims)} claims of the paper "
            f"{'; '.join(f'{count} {words}' for count, words in counts.values())}."] if counts else []),
         *(f"{topic.title}: {topic.answer}" for topic in evidence.topics),
-        f"\n{path} ({path.stat().st_size / 1e6:.1f} MB, from {files} run and table files) in {ended - started:.0f} s.",
+        f"\n{path} ({path.stat().st_size / 1e6:.1f} MB, from {len(evidence.runs)} runs) in {ended - started:.0f} s.",
         f"Beside it: {', '.join(file.name for file in beside)}.",
         f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.",
         *_failure_lines(failed),
     ]
     answers = {topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics}
     claims = {claim.key: {"outcome": claim.outcome, "answer": claim.answer} for claim in evidence.claims}
-    facts = {"page": path, "claims": claims, "beside": beside, "files": files, "seconds": took, "answers": answers,
-             "failed": failed}
+    facts = {"page": path, "claims": claims, "beside": beside, "runs": len(evidence.runs), "seconds": took,
+             "answers": answers, "failed": failed}
     if failed:
         return Answer(facts, lines, 1)
-    keep_answer(out, key, facts, lines, (entry.file for entry in evidence.manifest))
+    tables = [path.relative_to(out).as_posix() for path in (out / "tables").glob("*.h5")]
+    keep_answer(out, key, facts, lines, [*(f"runs/{run.file}" for run in evidence.runs), *tables])
     return Answer(facts, lines)
 
 

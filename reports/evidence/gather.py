@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, as_completed
 from contextlib import suppress
-from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
@@ -20,11 +19,10 @@ from reports.evidence.stage import Stage
 from reports.evidence.topics import AHEAD, CLAIM_STAGES, TOPICS, failed_topic, plans
 from reports.figures.paper import arm_energies
 from reports.pages.records import Evidence, FailedCases
-from reports.provenance import PEERS, collect_provenance, this_machine
+from reports.provenance import PEERS, collect_provenance
 from reports.runner import Runner
-from reports.store.io import opened, write_whole
+from reports.store.io import write_whole
 from reports.store.keys import evidence_version
-from reports.uses import StoredFile
 from reports.workers import REPORT_WORKERS, executor
 from verification import haptic_rate
 from verification.check import Study
@@ -49,8 +47,6 @@ SEEDS = {
     "proofs": "verification.proofs.numbers", "robots": "verification.mechanics.against_pinocchio",
     "mass matrices": "verification.mechanics.definiteness",
 }  # fmt: skip
-ABSENT = "absent"  # a run that a stage was made from, whose file has been removed since
-UNNAMED = "the report"  # the user of a run that no claim, topic or figure requested
 SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link_arm_b", "arm_pushing")
 FIGURE_RUNS = "runs of the figures"
 CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
@@ -105,7 +101,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         inputs=inputs, scenes=scenes, claims=ledger, proofs=stages["proofs"].records or (),
         counterexamples=stages["counterexamples"].records or (), hard_cases=stages["hard cases"].records or (),
         effects=shown, topics=tuple(topics), failed=failed, provenance=facts,
-        manifest=manifest(runner.used, stages.values(), out),
+        runs=tuple(runner.used.values()),
         seconds={stage.name: stage.seconds for stage in stages.values()},
     )  # fmt: skip
 
@@ -176,20 +172,6 @@ def _slowest_runs(out: Path, depth: str) -> None:
         if (out / "runs" / runner.file_of(scene, world)).is_file():
             return
         attempt("", partial(runner, scene, world, keep=False), [])  # the claim that needs it will name the failure
-
-
-def manifest(used: Mapping[str, StoredFile], stages: Iterable[Stage], out: Path) -> tuple[StoredFile, ...]:
-    """Return one line per used run file and per table file, in the order of use; paths are relative to `out`."""
-    files = [replace(run, file=f"runs/{run.file}", used_by=run.used_by or (UNNAMED,),
-                     status=run.status if (out / "runs" / run.file).is_file() else ABSENT)
-             for run in used.values()]  # fmt: skip
-    for stage in stages:
-        if stage.path.is_file():
-            with opened(stage.path, expected_format=None) as file:
-                content = str(file.attrs["content_hash"])
-            files.append(StoredFile(stage.name, stage.path.relative_to(out).as_posix(), stage.key, content,
-                                    "iapb reproduce", stage.path.stat().st_size, made_on=this_machine()))  # fmt: skip
-    return tuple(files)
 
 
 def provenance() -> dict[str, str]:

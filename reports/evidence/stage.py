@@ -23,7 +23,7 @@ from reports.store.records import read_record, write_record
 from reports.uses import StoredFile
 from verification.finding import Failure, attempt
 
-_LAYOUT = 4  # of the files: 3 did not say where runs were made
+_LAYOUT = 5  # of the files
 
 
 class Stage:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from itertools import groupby
@@ -20,7 +21,7 @@ from reports.figures.figure import Figure, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, is_number
 from reports.pages.first import LATER, NEXT, facts, made_from
 from reports.pages.formulas import formula, prose
-from reports.pages.records import Evidence, anchor, runs_by_user
+from reports.pages.records import Evidence
 from reports.pages.sections import SECTIONS
 from reports.pages.terms import HEADINGS, explained
 from verification import finding
@@ -32,7 +33,7 @@ from verification.scenes.measures import COORDINATES
 from verification.table import Table
 
 FIRST_PAGE = "report.html"
-# Largest number of table rows, or runs of a claim, on a page, to keep it small; the files beside it have all of them.
+# Largest number of table rows on a page, to keep it small; numbers.json has all of them.
 ROWS_SHOWN = 200
 # The mark of each verdict, of each kind of outcome of a claim, and of the parts that decide nothing. Marks differ in
 # shape as well as in colour.
@@ -66,9 +67,9 @@ def build_report(evidence: Evidence, drawn: Iterable[Figure] = ()) -> dict[str, 
     # The browser runs only this script and makes no requests; without the script the page is complete.
     policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
     shared = {
-        "script": Markup(text), "policy": policy, "played": played(figures), "evidence": evidence, "figures": figures,
+        "script": Markup(text), "policy": policy, "evidence": evidence, "figures": figures,
+        "run_counts": Counter(user for run in evidence.runs for user in run.used_by),
         "groups": [(group, list(found)) for group, found in groupby(SECTIONS, key=lambda section: section.group)],
-        "used": {user for entry in evidence.manifest for user in entry.used_by},
     }  # fmt: skip
     first = environment.get_template("first.html.j2").render(
         shared, facts=facts(evidence), made_from=made_from(evidence), first_map=first_map(evidence.claims), next=NEXT,
@@ -141,12 +142,6 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
                          "part", words=NAMED)
 
 
-def played(figures: Mapping[str, Sequence[Figure]]) -> dict[str, str]:
-    """Return the key of the figure that plays each run, by the input name of the run."""
-    return {name: figure.key for group in figures.values() for figure in group
-            if figure.panels and figure.panels[0].film for name in figure.inputs}  # fmt: skip
-
-
 def ranked(found: Iterable[Any]) -> list[Any]:
     """Return claims, topics or parts, the worst verdict first."""
     return sorted(found, key=lambda one: finding.WORST_FIRST.index(one.verdict))
@@ -207,7 +202,7 @@ def _environment() -> Environment:
         cell=format_cell, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
         mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
         judged=judged, heading=lambda title: HEADINGS.get(title, title), badge_words=badge_words,
-        counted=counted, tables_without=tables_without, runs_by_user=runs_by_user, anchor=anchor,
+        counted=counted, tables_without=tables_without,
         ranked=ranked, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals |= {"rows_shown": ROWS_SHOWN, "engine": ENGINE}

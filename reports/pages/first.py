@@ -33,7 +33,7 @@ COUNTED = dict(zip(KINDS, (
 GRAVEST = ("exact-energy", "hard-cases", "scene-ledger", "engines", "complementarity", "stability", "mechanics")
 NEXT = ("Read “The idea”: one formula, five minutes", "idea")  # the one next step, at the top
 LATER = (("which method for your time budget", "accuracy"), ("tests for your own solver", "properties"),
-         ("all data and commands", "manifest"))
+         ("how to compute it again", "provenance"))
 
 
 class Fact(NamedTuple):

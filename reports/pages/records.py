@@ -6,8 +6,7 @@ Findings and proofs come unchanged from the studies; the pages use no other data
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,17 +14,6 @@ from reports.uses import StoredFile
 from verification.finding import Failure, Finding
 from verification.proofs.show import ProofRecord
 from verification.table import Table
-
-
-def anchor(user: str) -> str:
-    """Return the id of the manifest line that lists the runs of a user (a claim, topic or figure input)."""
-    return "runs-" + re.sub(r"[^A-Za-z0-9]+", "-", user)
-
-
-def runs_by_user(files: Sequence[StoredFile]) -> dict[str, list[StoredFile]]:
-    """Return the runs of each user (a claim, topic or figure input), by first use; a run is listed under each user."""
-    users = dict.fromkeys(user for run in files for user in run.used_by)
-    return {user: [run for run in files if user in run.used_by] for user in users}
 
 
 @dataclass(frozen=True)
@@ -52,6 +40,6 @@ class Evidence:
     topics: tuple[Finding, ...] = ()  # the first page has the answer of each, in this order
     failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
-    manifest: tuple[StoredFile, ...] = ()
+    runs: tuple[StoredFile, ...] = ()  # that the numbers were computed from
     seconds: Mapping[str, float] = field(default_factory=dict)  # that each stage took to compute or read
     figure_command: str = "iapb reproduce --figure {key}"

@@ -13,7 +13,7 @@ class Section:
 
     group : heading in the contents
     needs : field of Evidence, or key of a topic, without which the page says that it was not computed
-    tables : names of the manifest's tables that store the section's numbers
+    stages : stages of the evidence whose failed cases the section lists
     topic : whether it is drawn from a Finding, by the template that all of them share
     """
 
@@ -21,7 +21,7 @@ class Section:
     id: str
     title: str
     needs: str = ""
-    tables: tuple[str, ...] = ()
+    stages: tuple[str, ...] = ()
     topic: bool = False
 
     @property
@@ -63,5 +63,4 @@ SECTIONS: tuple[Section, ...] = (
     Section(TIME, "effects", "Effects", "effects", ("effects",)),
     _topic(DATA, "survival", "Runs that repeat"),
     Section(DATA, "provenance", "Provenance", "provenance"),
-    Section(DATA, "manifest", "Manifest", "manifest"),
 )

@@ -156,7 +156,7 @@ def test_other_contents_and_versions_are_refused_by_name(wrong, said, tmp_path):
 def test_provenance_is_complete(tmp_path):
     facts = collect_provenance(seeds=(3, 4))
     assert read_provenance(write_run(tmp_path / "run.h5", made_run(), provenance=facts)) == facts
-    for name in ("version", "commit", "dirty", "lock", "cpu", "blas", "numba", "seeds", "command"):
+    for name in ("version", "commit", "uncommitted changes", "lock", "cpu", "blas", "numba", "seeds", "command"):
         assert facts[name]
 
 

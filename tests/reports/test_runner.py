@@ -86,7 +86,7 @@ def test_ctrl_c_in_a_run_stops_who_asked_for_it_and_keeps_what_was_done(tmp_path
     kept = read_run(partial)
     assert not kept.complete and kept.stopped == INTERRUPTED and 0 < kept.steps < PEG.steps and not runner.used
     runner(PEG, "IAPB", partial=True)
-    assert [used.status for used in runner.used.values()] == ["partial"]
+    assert [used.file.endswith(".partial") for used in runner.used.values()] == [True]
     runner.progress = None
     assert runner(PEG, "IAPB").complete and computed == ["IAPB"] * 3 and not list(tmp_path.glob("*.partial"))
 
@@ -121,7 +121,7 @@ def test_a_pasted_command_makes_the_same_run_again(values, world, rendering, sta
     program, *words = shlex.split(used.command)
     assert program == "iapb" and cli.main([*words, "--out", str(tmp_path / "two")]) == status
     [again] = Runner(tmp_path / "two").store.entries()
-    assert (again.file, again.run_key, again.content_hash) == (used.file, used.key, used.content_hash)
+    assert (again.file, again.content_hash) == (used.file, used.content_hash)
 
 
 def test_every_scene_and_every_run_of_the_figures_has_a_command_and_a_scene_of_ones_own_its_file(tmp_path):
