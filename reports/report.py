@@ -26,6 +26,7 @@ from reports.pages.sections import SECTIONS
 from reports.provenance import PEERS, collect_provenance
 from reports.store.io import write_whole
 from reports.store.keys import evidence_version, hash_of, plain, sources_hash
+from verification.proofs.coq import checked
 
 LARGEST_FIRST = 1_000_000  # bytes: a first page that cannot be mailed is not read
 _WRITTEN = (FIRST_PAGE, *(section.page for section in SECTIONS), NUMBERS_NAME, CRATE_NAME)
@@ -61,7 +62,7 @@ def report_key(out: Path, depth: str) -> str:
         "folder": str(out.absolute()), "depth": depth, "code": [evidence_version(), sources_hash("reports")],
         "pages": [folder_hash(folder / part) for part in ("templates", "scripts")],
         "depends": {stage: depends_of(stage) for stage in (*FOLDERS, *PACKAGES, "proofs")},
-        "facts": collect_provenance(packages=PEERS),
+        "facts": collect_provenance(packages=PEERS), "coq": checked.read(),
     })  # fmt: skip
 
 
