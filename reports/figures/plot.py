@@ -28,7 +28,8 @@ from reports.figures.style import (
 
 TIME, PATH = "time", "path"  # the cursor reads curves over time
 TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
-_BEHIND = 10.0  # points from the tail of an arrow to the middle of its name
+_ASIDE = 9.0  # points from an arrow to its name
+_SIDEWAYS = 0.3  # horizontal share of the way to the name from which the name begins there
 LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
 
 
@@ -178,11 +179,13 @@ class Canvas(Plot):
             self.named_arrow(start, length * force / np.hypot(*force), "hand")
 
     def named_arrow(self, start: Floats, vector: Floats, name: str) -> None:
-        """Draw an arrow and its name, behind its tail."""
+        """Draw an arrow and its name, to the right of its middle or, if it is horizontal, above it."""
         arrow(self.axes, start, vector)
-        on_paper = self.axes.transData.transform([start, start + vector])
-        way = np.subtract(*on_paper)
-        note(self.axes, start, name, tuple(_BEHIND * way / np.hypot(*way)), color=FORCE)
+        way = np.subtract(*self.axes.transData.transform([start + vector, start]))
+        aside = np.array([way[1], -way[0]]) / np.hypot(*way)
+        aside = aside if aside[0] > _SIDEWAYS or abs(aside[0]) <= _SIDEWAYS < aside[1] else -aside
+        side = "left" if aside[0] > _SIDEWAYS else "center"
+        note(self.axes, start + 0.5 * vector, name, tuple(_ASIDE * aside), color=FORCE, ha=side)
 
     def scale_bar(self, start: tuple[float, float], length: float, text: str) -> None:
         """Draw a scale bar to the right of `start`, with its text above it."""
