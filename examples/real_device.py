@@ -43,7 +43,8 @@ class Handle:
 scene = load_scene(find_scene("wall_1d"))
 device = Handle()
 coupling = FourChannel(stiffness=(100.0,), damping=(70.0,))
-simulation = Simulation(scene, ImpulseAugmented(), coupling, device)
+law = ImpulseAugmented(rendering="saturate")  # no impulse beyond what the motor can
+simulation = Simulation(scene, law, coupling, device)
 simulation.prepare()  # compiles, so that no step has to
 device.switched_on = due = time.monotonic()
 try:
