@@ -579,3 +579,71 @@ add("box_pushed_over_a_seam",
     scene(0.9, [box("box", (0.08, 0.05), 0.2, (0.0047105, 0.025, 0), (0.03, 0, 0))], WIDE, 0.3,
           hand={"body": "box", "force": [0.3 * 0.2 * G, 0, 0]}),
     moved(), 0.027, 0.027, "the push equals the friction that tilts it")  # fmt: skip
+
+# Impacts of many contacts at once, and of one after another, without gravity; the truth is the velocity at the end
+
+GROOVE_3D = [
+    {"name": f"side_{i}", "kind": "half_space", "point": [0, 0, 0], "normal": [side, 0, 1]}
+    for i, side in enumerate((1, -1))
+]
+FEET = [
+    {"kind": "box", "size": [0.02] * 3, "center": [x, y, -0.04]} for x in (-0.04, 0.04) for y in (-0.04, 0.04)
+]
+
+
+def still(name: str, mass: float, x: float, y: float = 0.0, speed: float = 0.0) -> Values:
+    """Return a ball of 10 cm in the plane z = 0, by default at rest."""
+    return ball(name, 0.05, mass, (x, y, 0.0), (speed, 0, 0, 0, 0, 0))
+
+
+def leaving(motion: Motion) -> Floats:
+    """Return the mean velocity of each body over the last ten steps [m/s]."""
+    return (motion.place[-1] - motion.place[-11]) / (motion.time[-1] - motion.time[-11])
+
+
+def against_a_wall(ratio: float) -> tuple[float, float]:
+    """Return the velocities of a heavy ball (1 m/s at the start) and of a light one between it and a wall at +x."""
+    heavy, light = 1.0, 0.0
+    while heavy > light or light > 0.0:
+        if heavy > light:
+            common = (ratio * heavy + light) / (ratio + 1.0)
+            heavy = 2.0 * common - heavy
+            light = 2.0 * common - light
+        else:
+            light = -light
+    return heavy, light
+
+
+add(
+    "cradle_with_gaps",
+    scene(0.2, [still(f"ball_{k}", 1.0, 0.1041 * (k - 1) if k else -0.1203, speed=float(k == 0)) for k in range(5)],
+          restitution=1.0, gravity=0.0),
+    leaving, np.array([[0.0, 0.0, 0.0]] * 4 + [[1.0, 0.0, 0.0]]), 1.0,
+    "the last ball leaves with the first one's velocity",
+)  # fmt: skip
+add(
+    "bernoulli",
+    scene(0.1, [still("striker", 1.0, -0.05 * math.sqrt(3.0) - 0.0203, speed=1.0), still("upper", 1.0, 0.0, 0.05),
+                still("lower", 1.0, 0.0, -0.05)], restitution=1.0, gravity=0.0),
+    leaving, np.array([[-0.2, 0.0, 0.0], [0.6, 0.2 * math.sqrt(3.0), 0.0], [0.6, -0.2 * math.sqrt(3.0), 0.0]]), 1.0,
+    "the striker returns with 1/5 of its speed (Bernoulli 1742)",
+)  # fmt: skip
+add(
+    "balls_and_wall",
+    scene(3.0, [still("heavy", 100.0, -1.1, speed=1.0), still("light", 1.0, -0.55)],
+          [{"name": "wall", "kind": "half_space", "point": [0, 0, 0], "normal": [-1, 0, 0]}],
+          restitution=1.0, gravity=0.0),
+    lambda motion: leaving(motion)[:, 0], np.array(against_a_wall(100.0)), 1.0, "31 elastic collisions (Galperin 2003)",
+)  # fmt: skip
+FALLING = box("box", (0.1,) * 3, 1.0, (0, 0, 0.0603), (0, 0, -1, 0, 0, 0))
+for name, shapes in (("box_lands_on_four_corners", FALLING["shapes"]), ("box_lands_on_four_feet", FEET)):
+    add(name, scene(0.05, [FALLING | {"shapes": shapes}], [GROUND], restitution=0.5, gravity=0.0),
+        leaving, np.array([[0.0, 0.0, 0.5]]), 1.0, "leaves flat at half its speed")
+TURNED = [0, math.sin(math.pi / 8), 0, math.cos(math.pi / 8)]  # by 45 degrees about y
+SPEED = math.sqrt(0.5)  # along the axes of the turned cube
+add(
+    "cube_in_groove",
+    scene(0.05, [box("cube", (0.1,) * 3, 1.0, (0, 0, 0), (SPEED, 0, -SPEED, 0, 0, 0))
+                 | {"position": [0, 0, math.sqrt(2.0) * 0.0603, *TURNED]}], GROOVE_3D, restitution=1.0, gravity=0.0),
+    leaving, np.array([[0.0, 0.0, 1.0]]), 1.0, "eight corners at once: it leaves with its speed",
+)  # fmt: skip
