@@ -73,5 +73,4 @@ if __name__ == "__main__":
     scene = load_scene(find_scene("two_discs")).with_values({"contact": {"restitution": 1.0}})
     run = Springs().run(scene)
     print(run.summary)
-    kinetic = run.energy["kinetic"]
-    print("energy kept to a thousandth:", abs(kinetic[-1] / kinetic[0] - 1.0) < 1e-3)
+    print("kinetic energy kept:", run.energy["kinetic"][[0, -1]].round(3))
