@@ -25,7 +25,6 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.rendering import PLANNED, Port
 from iapb.linalg import cholesky
-from iapb.mechanics.integrators import INTEGRATORS
 from iapb.mechanics.kernels.arrays import make_workspace
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.structure import make_free_motion
@@ -132,7 +131,6 @@ class System:
             contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions", "joint_limits")),
             supports=flag(contact.forces == "implicit" and self.capacity > 1),
         )
-        integrator = INTEGRATORS[law.integrator]
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
         world: Any = block(World(
             mechanism=mechanism.block, shapes=self.shapes, pairs=self.pairs,
@@ -147,9 +145,7 @@ class System:
             own_restitution=scene_parts.restitution_by_shape(scene),
             per_body_rows=contact.self_collision_rows == "per_body",
             joint_damping=self.joint_damping, stops=self.stops, impulse_limit=limit,
-            stage_fraction=np.array(integrator.fraction), stage_weight=np.array(integrator.weight),
-            semi_implicit=integrator.semi_implicit, conserving=integrator.conserving,
-            free=make_free_motion(mechanism.arrays, mechanism.tree_of_body),
+            conserving=law.integrator == "momentum", free=make_free_motion(mechanism.arrays, mechanism.tree_of_body),
         ))
         return self._worlds.setdefault(key, (world, Entry(advance)))
 
@@ -168,7 +164,7 @@ class System:
         state = State(
             **blank(quantities(State), {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows}),
             body=make_workspace(len(mechanism.bodies), d), contacts=zeros_of(ContactBuffer, contact=c),
-            previous=zeros_of(ContactBuffer, contact=c), stage_contacts=zeros_of(ContactBuffer, contact=c),
+            previous=zeros_of(ContactBuffer, contact=c), scratch_contacts=zeros_of(ContactBuffer, contact=c),
             work=zeros_of(ImpactWork, velocity=d, row=rows), push_work=zeros_of(PushWork, velocity=d, row=rows),
             friction_work=zeros_of(FrictionWork, velocity=d * sliding, row=rows * sliding,
                                    tangent=rows * tangents * sliding, direction=tangents),

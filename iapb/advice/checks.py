@@ -2,8 +2,8 @@
 
 The explicit forces of the paper have limits that implicit contact has not. A lasting contact oscillates on its spring
 and damper (5). Let m = 1/(J M⁻¹ Jᵀ) be its effective mass, k = K Δt²/m and
-b = B Δt/m. A step of the law's integrator maps (gap, velocity) linearly. The oscillation grows if that map has an
-eigenvalue of modulus above 1; for semi-implicit Euler this means k + 2 b > 4. Contacts that share a body oscillate
+b = B Δt/m. A step maps (gap, velocity) linearly. The oscillation grows if that map has an eigenvalue of modulus above
+1, which means k + 2 b > 4. Contacts that share a body oscillate
 together: 1/m is then the largest eigenvalue of J M⁻¹ Jᵀ over all of them. A new contact can start at a depth of up to
 v Δt, and its spring then returns up to k times the kinetic energy of the approach, so k must not exceed 1 either.
 `contact.auto` chooses values well below both limits. `iapb.advice.distrust` checks the run itself.
@@ -23,7 +23,6 @@ from iapb.advice.solids import joined, solids_of
 from iapb.compiled import block
 from iapb.contact import geometry, laws
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
@@ -239,35 +238,25 @@ class Start:
         return " and ".join(named) if len(named) < 3 else f"{', '.join(named[:3])}{' …' if len(named) > 3 else ''}"
 
 
-def step_limits(start: Start, integrator: str = "semi_implicit_euler") -> StepLimits | None:
+def step_limits(start: Start) -> StepLimits | None:
     """Return the limits at the most critical contacts; None if nothing can touch."""
-    method, dt, contact, (x, y) = INTEGRATORS[integrator], start.dt, start.scene.contact, np.eye(2)
-
-    def holds(k: float, b: float) -> bool:
-        q, v = method.step(lambda q, v, dt: q + dt * v, lambda q, v: -k * q - b * v, x, y, 1.0)
-        return float(np.abs(np.linalg.eigvals([q, v])).max()) <= 1.0 + ROUNDED
-
-    def limits(mobility: float, rows: Rows, most: float) -> StepLimits:
-        k, b = contact.stiffness * mobility * dt**2, contact.damping * mobility * dt
-        stiffness = _largest(lambda x: x <= most and holds(x, b), 4.0) / (mobility * dt**2)
-        damping = _largest(lambda x: holds(k, x), 4.0) / (mobility * dt)
-        longest = _largest(lambda x: k * x**2 <= most and holds(k * x**2, b * x), 1e6) * dt
-        rate = 1.0 / longest if longest else math.inf
-        return StepLimits(start.names(rows), len(rows), 1.0 / mobility, stiffness, damping, rate)
-
-    found = [limits(*one, most) for one, most in zip(start.critical, (math.inf, THROWN), strict=True) if one[0]]
-    return min(found, key=lambda one: (one.stiffness, one.damping), default=None)
+    worst = (_limits_at(start, *one, most) for one, most in zip(start.critical, (math.inf, THROWN), strict=True)
+             if one[0])  # fmt: skip
+    return min(worst, key=lambda one: (one.stiffness, one.damping), default=None)
 
 
-def _largest(good: Callable[[float], bool], high: float) -> float:
-    """Return the largest x in (0, high] with good(x), or 0 if there is none; good is true up to some x."""
-    low = 0.0
-    if good(high):
-        return high
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if good(middle) else (low, middle)
-    return low if low > 1e-9 * high else 0.0
+def _limits_at(start: Start, mobility: float, rows: Rows, most: float) -> StepLimits:
+    """Return the limits at contacts (c,) of a mobility [1/kg]: k + 2 b <= 4, and k <= `most`."""
+    dt, contact = start.dt, start.scene.contact
+    stable = 4.0 * (1.0 + ROUNDED)
+    k = contact.stiffness * mobility * dt**2
+    b = contact.damping * mobility * dt
+    stiffness = min(most, max(0.0, stable - 2.0 * b))
+    damping = max(0.0, 0.5 * (stable - k))
+    # A step of Δt/y has k/y² and b/y, so it is stable from the root of 4 y² - 2 b y - k on.
+    least = max((b + math.sqrt(b**2 + stable * k)) / stable, math.sqrt(k / most))
+    return StepLimits(start.names(rows), len(rows), 1.0 / mobility, stiffness / (mobility * dt**2),
+                      damping / (mobility * dt), least / dt)
 
 
 def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Caution, ...]:
@@ -291,7 +280,7 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
         found += _sags(start)
     integrator = getattr(chosen, "integrator", "semi_implicit_euler")
     if laws.PENALTY in uses and scene.contact.forces == "paper":
-        found += _too_stiff(start, integrator)
+        found += _too_stiff(start)
         found += _overdriven_friction(start) if laws.FRICTION in uses else ()
     elif laws.PENALTY in uses and start.spatial and len(start.pairs) and integrator != "momentum":
         found.append(Caution("integrator", scene.name, "implicit contact in space can gain energy with the integrator "
@@ -419,18 +408,17 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
     yield from said
 
 
-def _too_stiff(start: Start, integrator: str) -> Iterator[Caution]:
+def _too_stiff(start: Start) -> Iterator[Caution]:
     """Warn of stiffness or damping beyond the stable limits of the step."""
-    limits, contact = step_limits(start, integrator), start.scene.contact
+    limits, contact = step_limits(start), start.scene.contact
     if limits is None or (contact.stiffness <= limits.stiffness and contact.damping <= limits.damping):
         return
     by_damping = limits.damping > 0.0 and contact.damping * limits.stiffness > contact.stiffness * limits.damping
     field = "damping" if limits.stiffness == 0.0 or by_damping else "stiffness"
-    remedy = f"rate >= {_up(limits.rate):g} Hz" if math.isfinite(limits.rate) else "another integrator"
     yield Caution(field, limits.where, f"contact.{field} = {getattr(contact, field):g} {_UNITS[field]} is more than a "
                   f"step of {start.scene.rate:g} Hz can hold at {limits.where} ({limits.contacts} contact"
                   f"{'s' * (limits.contacts > 1)}, effective mass {limits.mass:.3g} kg): set contact.{field} <= "
-                  f"{_down(getattr(limits, field)):g}, or {remedy}")
+                  f"{_down(getattr(limits, field)):g}, or rate >= {_up(limits.rate):g} Hz")
 
 
 def _sags(start: Start) -> Iterator[Caution]:

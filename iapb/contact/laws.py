@@ -15,11 +15,11 @@ import numpy as np
 from iapb.contact.kernels.step import STATUS_TEXT
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
-from iapb.mechanics.integrators import INTEGRATORS
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.schema import Floats
 
+INTEGRATORS = ("momentum", "semi_implicit_euler")  # of a scene: see `iapb.contact.kernels.step`
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
 # Parts of a scene's contact section. A law's attribute `uses` names the parts that affect it.
@@ -110,7 +110,7 @@ class ImpulseAugmented(_EngineLaw):
 
     Parameters
     ----------
-    integrator : name in `INTEGRATORS`.
+    integrator : ``momentum`` or ``semi_implicit_euler`` (`iapb.contact.kernels.step`); default: the scene's.
     rendering : how the device's force limits affect impulses (paper section VI). ``full`` ignores the limits;
         ``saturate`` clips the force on the device; ``scale`` scales the impulse of tool and device alike; ``spread``
         scales it and stays in collision until the rest is rendered. Without limits in the scene all four are the same.

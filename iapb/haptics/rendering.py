@@ -239,13 +239,13 @@ def engage(world, state, port):
 
 @kernel
 def inside(world, state, port):
-    """Return whether the tool would penetrate a body at the device's pose; uses the stage scratch of the state."""
-    copy_into(state.start_q, state.q)
-    copy_into(state.start_q[port.q_start : port.q_stop], port.device_q)
-    forward_kinematics(world.mechanism, state.start_q, state.body)
-    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, state.stage_contacts)
+    """Return whether the tool would penetrate a body at the device's pose; uses the scratch of the state."""
+    copy_into(state.scratch_q, state.q)
+    copy_into(state.scratch_q[port.q_start : port.q_stop], port.device_q)
+    forward_kinematics(world.mechanism, state.scratch_q, state.body)
+    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, state.scratch_contacts)
     for i in range(max(count, 0)):
-        a, b = state.stage_contacts.body_a[i], state.stage_contacts.body_b[i]
+        a, b = state.scratch_contacts.body_a[i], state.scratch_contacts.body_b[i]
         if world.tree_of_body[a] == port.tool_tree or (b >= 0 and world.tree_of_body[b] == port.tool_tree):
             return True
     return False

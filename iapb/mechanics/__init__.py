@@ -1,1 +1,1 @@
-"""Configuration space (paper section IV): mechanisms, their equations of motion, integrators, energy."""
+"""Configuration space (paper section IV): mechanisms, their equations of motion, energy."""

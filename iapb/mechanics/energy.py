@@ -8,7 +8,7 @@ at q_k on v_k, before the forces. Then, summed over the steps so far,
     kinetic + potential - initial = hand + coupling + penalty + friction work - impact_loss + residual.
 
 The residual is energy that the time integration created (> 0) or lost (< 0); over a given time it falls with
-the method's order. One step of semi-implicit Euler, for example, moves by v_k+1 while the kinetic energy changes
+the step. One step of semi-implicit Euler, for example, moves by v_k+1 while the kinetic energy changes
 by F . (v_k + v_k+1) / 2 dt (constant M): it loses F . M^-1 F dt^2 / 2.
 """
 

@@ -217,7 +217,7 @@ class Scene(ScenePart):
     source: Text = Field("", description="where the scene comes from")
     rate: Annotated[Positive, Field(le=MAX_RATE)] = Field(description="simulation rate [Hz]; the step is 1/rate")
     duration: Positive = Field(description="simulated time [s]")
-    integrator: Literal["momentum", "semi_implicit_euler", "midpoint", "runge_kutta_4"] | None = Field(
+    integrator: Literal["momentum", "semi_implicit_euler"] | None = Field(
         None, description="how a step moves the bodies; default momentum, which keeps linear and angular momentum; in "
         "the plane with contact.forces: paper semi_implicit_euler")
     gravity: Gravity[Vector2] = None

@@ -29,7 +29,7 @@ def check(
         remarks = (*remarks, f"{source.name} in {world}: {said}")
     lines, limits = [f"{remark}." for remark in remarks], None
     if source.contact.forces == "paper":  # implicit contact has no such limits
-        limits = step_limits(Start(source), getattr(law, "integrator", "semi_implicit_euler"))
+        limits = step_limits(Start(source))
     if limits is not None:
         lines.append(f"At {source.rate:g} Hz the step holds contact.stiffness <= {limits.stiffness:.3g} N/m and "
                      f"contact.damping <= {limits.damping:.3g} N s/m, each with the other unchanged; critical "

@@ -33,7 +33,7 @@ def topic(runs, order=1.0):
     """The topic of the scenes made from these runs, and from residuals of this order."""
     shares = {1: 0.04, 2: 0.02, 4: 0.01}
     rows = {"contact": map(ledger.contact_row, runs), "energy ledger": map(ledger.book_row, runs),
-            "what the books leave open": (residual_row(name, 1e-3, shares, 1, order) for name in NAMES),
+            "what the books leave open": (residual_row(name, 1e-3, shares, order) for name in NAMES),
             "books over time": (row for run in runs for row in ledger.over_time(run))}  # fmt: skip
     tables = {check.key: check.table_of(rows[check.key]) for check in ledger.scene_ledger.checks}
     parts = [part for check in ledger.scene_ledger.checks for part in check.sentences(tables[check.key])]

@@ -4,7 +4,7 @@ The normal force (5) of a contact is a spring K s and a damper −B v_n; their s
 K s² / 2. The damper's work is its force, held over the step, times the distance by which the touching points separate.
 
 A force held over a step does other work than a force that changes within the step. This error belongs to the integrator
-and falls with its declared order; any residual that does not fall is a fault. The residual has two channels, the motion
+and falls with its order, 1; any residual that does not fall is a fault. The residual has two channels, the motion
 and the contact springs. The two may have opposite signs, so their absolute values are added. A line of its own has the
 part of the springs that curved gaps cause: the step pushes along J Δq, the touching points move along arcs.
 """
@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of
@@ -28,7 +27,7 @@ from reference import Floats
 Book = Mapping[str, float]
 
 ROUNDING = 1e-12  # share of the total energy that bounds the rounding of some thousand sums in double precision
-ORDER_SLACK = 0.25  # tolerance below the declared order, because collision times change with the step
+ORDER_SLACK = 0.25  # tolerance below order 1, because collision times change with the step
 OPEN_SHARE, GAIN_SHARE = "residual by size, share of the energy exchanged", "most energy beyond what was put in"
 WORTH_NAMING = 1.0  # [%] of the energy exchanged; scenes with a larger energy residual are listed
 OPEN = "residual at the scene's step"
@@ -102,9 +101,9 @@ def rounding_of(book: Book) -> float:
     return ROUNDING * max(abs(total(book, "start")), abs(total(book, "end")), book["energy exchanged"])
 
 
-def as_declared(row: Mapping[str, Any]) -> bool:
-    """Whether the measured order in a row is at least the declared one; rounding has no order."""
-    return row["order measured"] is None or bool(row["order measured"] >= row["order declared"] - ORDER_SLACK)
+def is_first_order(row: Mapping[str, Any]) -> bool:
+    """Whether the measured order in a row is at least 1; rounding has no order."""
+    return row["order measured"] is None or bool(row["order measured"] >= 1.0 - ORDER_SLACK)
 
 
 def open_row(scene: Scene, simulate: Callable[[Scene], Run], refinements: Sequence[int]) -> dict[str, Any]:
@@ -123,12 +122,11 @@ def open_row(scene: Scene, simulate: Callable[[Scene], Run], refinements: Sequen
     if len(books) > 1:  # the error falls as step^order
         order = math.log(first / last) / math.log(refinements[len(books) - 1] / refinements[0]) if last else math.inf
     shares = dict(zip(refinements, (book[OPEN_SHARE] / 100 for book in books), strict=False))
-    declared = INTEGRATORS[run.law_settings["integrator"]].order
-    return residual_row(scene.name, 1.0 / scene.rate, dict.fromkeys(refinements) | shares, declared, order)
+    return residual_row(scene.name, 1.0 / scene.rate, dict.fromkeys(refinements) | shares, order)
 
 
 def residual_row(
-    scene: str, step: float, shares: Mapping[int, float | None], declared: int, order: float | None
+    scene: str, step: float, shares: Mapping[int, float | None], order: float | None
 ) -> dict[str, Any]:
     """Return the row of residuals, shares of the energy exchanged, by the divisor of the scene's step [s]; None if that
     step was not tried."""
@@ -136,7 +134,7 @@ def residual_row(
     return {
         "scene": scene, **{f"{OPEN} [%]" if k == 1 else f"at 1/{k} of this step [%]":
                            None if share is None else 100 * share for k, share in shares.items()},
-        "order declared": declared, "order measured": order, "the scene's step [ms]": 1e3 * step,
+        "order measured": order, "the scene's step [ms]": 1e3 * step,
         f"step for a residual of {WORTH_NAMING:g} % [ms]": None if found is None else 1e3 * found,
     }  # fmt: skip
 

@@ -18,9 +18,9 @@ from verification.scenes.books import (
     ORDER_SLACK,
     ROUNDING,
     WORTH_NAMING,
-    as_declared,
     energy_book,
     energy_series,
+    is_first_order,
     open_row,
     rounding_of,
     scene_of,
@@ -138,14 +138,14 @@ def _of_residuals(table: Table) -> Iterator[Part]:
     """Yield the parts on the order of the residuals and on their size. The channels are added by size."""
     rows = table.records()
     tried = [row for row in rows if row["order measured"] is not None]
-    short = [row for row in tried if not as_declared(row)]
+    short = [row for row in tried if not is_first_order(row)]
     orders = sorted(float(row["order measured"]) for row in tried)
     below = ", ".join(f"{row['scene']} ({row['order measured']:.2f})" for row in short)
     yield Part.of(
         "The residual of the energy balance is rounding, or falls as the step is shortened",
         f"rounding in {len(rows) - len(tried)} scenes; order {orders[0]:.2f} to {orders[-1]:.2f} "
         f"(median {float(np.median(orders)):.2f}) in {len(tried)} scenes" + (f"; too low: {below}" if short else ""),
-        f"order of the integrator, {max(row['order declared'] for row in tried)}, or at most {ORDER_SLACK} less",
+        f"order 1, or at most {ORDER_SLACK} less",
         MIXED if short else REPRODUCED)
     wide = sorted((row for row in rows if row[OPEN] > WORTH_NAMING), key=lambda row: float(row[OPEN]), reverse=True)
     said = ", ".join(f"{row['scene']} {row[OPEN]:.3g} %" for row in wide)
@@ -173,7 +173,7 @@ CONTACTS = Check(
     digits=3,
 )
 RESIDUALS = Check(
-    key="what the books leave open", question="Does the residual fall with the integrator's order?",
+    key="what the books leave open", question="Does the residual fall with the step?",
     cases=lambda study: scene_names(), says=_of_residuals, digits=3,
     row=lambda study, name: open_row(study.scene(name), lambda scene: study.run(scene, WORLD, keep=False),
                                      REFINEMENTS[study.depth]),
@@ -200,13 +200,13 @@ OVER_TIME = Check(
 def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
     contacts, residuals = tables["contact"].records(), tables["what the books leave open"].records()
     deepest, widest = _most(contacts, "most penetration"), _most(residuals, OPEN)
-    falls = sum(as_declared(row) for row in residuals)
+    falls = sum(is_first_order(row) for row in residuals)
     return (
         f"In {len(contacts)} scenes, {sum(row['dimensions'] == 3 for row in contacts)} of them three-dimensional, "
         f"bodies overlap by at most {deepest['most penetration']:.2f} mm. The energy errors of the time steps add "
         f"up to at most {widest[OPEN]:.1f} % of the energy exchanged (“{_title(widest['scene'])}”). In {falls} of "
-        f"{len(residuals)} scenes this error is rounding, or falls with shorter steps as fast as the integrator's "
-        "order predicts (or by at most 0.25 less)."
+        f"{len(residuals)} scenes this error is rounding, or falls in proportion to the step "
+        "(with an order of 1, or at most 0.25 less)."
     )
 
 
@@ -214,8 +214,8 @@ scene_ledger = Topic(
     key="scene-ledger", title="The scenes",
     question="Every scene file of the project is run in the world IAPB at its own time step. For each run we compute "
     "an energy balance: ideally, the change of stored energy equals the work of hand and coupling minus the losses. "
-    "The difference, the residual, is the error of time stepping. It must fall with the integrator's order when the "
-    "step is shortened. Residuals are shares of the energy exchanged. The residual of the motion and that of the "
+    "The difference, the residual, is the error of time stepping. It must fall in proportion to the step when "
+    "the step is shortened. Residuals are shares of the energy exchanged. The residual of the motion and that of the "
     "contact springs are added by absolute value, so that opposite signs do not cancel.",
     checks=(CONTACTS, RESIDUALS, BOOKS, OVER_TIME), says=_answer,
 )

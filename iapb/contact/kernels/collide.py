@@ -289,7 +289,7 @@ def strike_again(world, state):
 
     The impacts of a step are at most as many as its log has lines. What is left strikes in the next step.
     """
-    contacts, now, count, some = state.contacts, state.stage_contacts, state.contact_count[0], False
+    contacts, now, count, some = state.contacts, state.scratch_contacts, state.contact_count[0], False
     if not world.implicit or world.switches.impulse_limit:
         return False
     for i in range(count):

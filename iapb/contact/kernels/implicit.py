@@ -476,7 +476,7 @@ def guard(world, state, size, count, s):
 
 @kernel
 def give_back(world, state, size, count, s):
-    """Write the group's velocity to v and mean_v, and the forces to the contacts and the generalized forces."""
+    """Write the group's velocity to v, and the forces to the contacts and the generalized forces."""
     work, contacts = state.rest_work, state.contacts
     pushed, rubbed = work.given[:size], work.step[:size]
     for i in range(size):
@@ -495,6 +495,6 @@ def give_back(world, state, size, count, s):
             store(contacts.friction_force, i, force)
     for i in range(size):
         k = work.dof[i]
-        state.v[k] = state.mean_v[k] = work.v[i]
+        state.v[k] = work.v[i]
         state.penalty_force[k] += pushed[i]
         state.friction_force[k] += rubbed[i]

@@ -33,15 +33,15 @@ def friction_share(normal_force, speed, friction, friction_velocity):
 
 @kernel(needs="explicit")
 def resting_force(world, state, contacts, i):
-    """Add the forces (4) of contact i to those of the stage, as generalized forces Jᵀ F.
+    """Add the forces (4) of contact i to those of the step, as generalized forces Jᵀ F.
 
     contacts : velocities up to date (`contact_velocities`); normal_force and friction_force are written
     """
     force = normal_force(contacts.gap[i], contacts.normal_velocity[i], world.stiffness, world.damping, world.clamped)
     contacts.normal_force[i] = force
     x, n = load(contacts.point, i), load(contacts.normal, i)
-    add_body_row(world.mechanism, state.body, contacts.body_a[i], x, n, force, state.stage_penalty)
-    add_body_row(world.mechanism, state.body, contacts.body_b[i], x, n, -force, state.stage_penalty)
+    add_body_row(world.mechanism, state.body, contacts.body_a[i], x, n, force, state.penalty_force)
+    add_body_row(world.mechanism, state.body, contacts.body_b[i], x, n, -force, state.penalty_force)
     friction = friction_of(world, contacts, i)
     if friction == 0.0:
         return
@@ -49,6 +49,6 @@ def resting_force(world, state, contacts, i):
     speed = math.sqrt(dot(tangential, tangential))
     friction_force = scale(friction_share(force, speed, friction, world.friction_velocity), tangential)
     store(contacts.friction_force, i, friction_force)
-    add_point_force(world.mechanism, state.body, contacts.body_a[i], x, friction_force, state.stage_friction)
+    add_point_force(world.mechanism, state.body, contacts.body_a[i], x, friction_force, state.friction_force)
     opposite = scale(-1.0, friction_force)
-    add_point_force(world.mechanism, state.body, contacts.body_b[i], x, opposite, state.stage_friction)
+    add_point_force(world.mechanism, state.body, contacts.body_b[i], x, opposite, state.friction_force)

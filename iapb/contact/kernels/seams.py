@@ -71,5 +71,5 @@ def is_apart(world, state, a, b):
     for k in range(world.pairs.shape[0]):
         if world.pairs[k, 0] == a and world.pairs[k, 1] == b:
             return detect(world.shapes, world.pairs[k : k + 1], state.body.rotation, state.body.position, -_OVERLAPS,
-                          state.stage_contacts) == 0
+                          state.scratch_contacts) == 0
     return False

@@ -2,6 +2,16 @@
 
 `advance` is the whole contact law: contacts (III), collisions (V), resting forces (IV), integration by Δt.
 The Penalty law is the same algorithm with the impulses switched off (e = −1, claim C09).
+
+Forces at the start of a step give the new velocity, and the bodies move with it. The scene's `integrator` says how:
+
+- ``momentum``, the default, moves the bodies freely (`iapb.mechanics.kernels.free_motion`): linear and angular momentum
+  are kept to rounding in the world's axes. Trees without contact get half of gravity before and half after they move,
+  so they move with order 2 under gravity, and a free rigid body with order 4. With contact, or under forces of a hand
+  or device, the order is 1.
+- ``semi_implicit_euler``, the paper's, has order 1: Coriolis terms are forces at the start of the step.
+
+On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """
 
 from __future__ import annotations
@@ -142,26 +152,10 @@ def present_contacts(world, state, contacts):
 
 @kernel
 def move(world, state, applied):
-    """Integrate (7) over Δt: forces at each stage, new velocity, new configuration."""
-    copy_into(state.start_q, state.q)
-    for k in range(state.v.shape[0]):
-        state.start_v[k], state.mean_v[k], state.mean_acceleration[k] = state.v[k], 0.0, 0.0
-    for stage in range(world.stage_weight.shape[0]):
-        weight, time = world.stage_weight[stage], world.dt * world.stage_fraction[stage]
-        if stage > 0:  # with velocity and acceleration of the stage before
-            integrate(world.mechanism, state.start_q, state.v, time, state.q)
-            copy_into(state.v, state.start_v)
-            add_multiple(state.v, time, state.acceleration)
-            if not locate(world, state):
-                return NOT_POSITIVE_DEFINITE
-        accelerate(world, state, applied, stage)
-        for k in range(state.v.shape[0]):
-            state.mean_v[k] += weight * state.v[k]
-            state.mean_acceleration[k] += weight * state.acceleration[k]
-            state.penalty_force[k] += weight * state.stage_penalty[k]
-            state.friction_force[k] += weight * state.stage_friction[k]
-    for k in range(state.v.shape[0]):
-        state.v[k] = state.start_v[k] + world.dt * state.mean_acceleration[k]
+    """Integrate (7) over Δt: forces, new velocity, new configuration."""
+    copy_into(state.start_v, state.v)
+    accelerate(world, state, applied)
+    add_multiple(state.v, world.dt, state.acceleration)
     touches = world.switches.contacts and world.implicit
     if (touches or world.switches.joint_damping) and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
@@ -172,8 +166,7 @@ def move(world, state, applied):
         return NOT_FINITE
     if world.conserving:
         return OK if drift(world, state, applied) else NOT_POSITIVE_DEFINITE
-    velocity = state.v if world.semi_implicit else state.mean_v
-    integrate(world.mechanism, state.start_q, velocity, world.dt, state.q)
+    integrate(world.mechanism, state.q, state.v, world.dt, state.q)
     return OK
 
 
@@ -181,10 +174,6 @@ def move(world, state, applied):
 def implicit_forces(world, state, touches):
     """Apply joint damping and contact, from the state at the start of the step. Return False if M is not definite."""
     damped = world.switches.joint_damping
-    if world.stage_weight.shape[0] > 1:
-        copy_into(state.q, state.start_q)
-        if not locate(world, state):
-            return False
     if damped and not damp_joints(world, state):
         return False
     if touches:
@@ -201,7 +190,7 @@ def drift(world, state, applied):
     """Move all trees freely for Δt, then apply the second half of gravity to falling trees. False: M not definite."""
     m, free = world.mechanism, world.free
     if not (free.turning and world.switches.velocity_terms):
-        integrate(m, state.start_q, state.v, world.dt, state.q)
+        integrate(m, state.q, state.v, world.dt, state.q)
     else:
         parts = 0
         if free.linked:
@@ -255,13 +244,13 @@ def swing(world, state, h):
             shift_root(m, free, state.body, world.tree_of_body, state.q, t, subtract((p[6], p[7], p[8]), center))
     copy_into(state.located_q, state.q)
     copy_into(state.body.placed_q[: state.q.shape[0]], state.q)
-    copy_into(state.mean_acceleration, a)
+    copy_into(state.acceleration_before, a)
     coriolis(world, state)
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
             start, stop = world.tree_start[t], world.tree_stop[t]
             for k in range(start, stop):
-                state.v[k] += 0.5 * h * (a[k] - state.mean_acceleration[k])
+                state.v[k] += 0.5 * h * (a[k] - state.acceleration_before[k])
             p = state.root_momentum[t]
             to_fixed_axes(m, free, state.body, state.q, t, p, -1.0)
             keep_momentum_and_energy(state.mass_matrix, state.lower, start, stop, free.base[t], p,
@@ -309,8 +298,7 @@ def damp_joints(world, state):
     """Solve (M + Δt D) v⁺ = M v for damped trees, D diagonal; −D v⁺ into `acceleration`. False: not definite.
 
     v⁺ minimizes ½|v⁺ − v|²_M + ½ Δt v⁺ᵀ D v⁺, so that ½|v⁺|²_M ≤ ½|v|²_M for every D ≥ 0 and every Δt: the step is
-    passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M. These trees move with the new velocity under
-    every integrator.
+    passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M.
     """
     a, mass, lower = state.acceleration, state.work.mass, state.work.lower
     for t in range(world.tree_start.shape[0]):
@@ -329,33 +317,26 @@ def damp_joints(world, state):
             return False
         solve_mass(lower[start:stop, start:stop], a[start:stop], a[start:stop])
         for k in range(start, stop):
-            state.v[k] = state.mean_v[k] = a[k]
+            state.v[k] = a[k]
             a[k] *= -world.joint_damping[k]
     return True
 
 
 @kernel
-def accelerate(world, state, applied, stage):
-    """Solve (7), M a = applied + penalty + friction − B − G, at the present stage.
+def accelerate(world, state, applied):
+    """Solve (7), M a = applied + penalty + friction − B − G.
 
     The forces (4)-(6) act at the contacts of groups that do not collide; in a collision the impulse acts.
     """
-    a, contacts, count = state.acceleration, state.contacts, 0
+    a, contacts = state.acceleration, state.contacts
+    if not world.implicit:
+        for i in range(state.contact_count[0]):
+            contacts.normal_force[i] = 0.0
+            store(contacts.friction_force, i, (0.0, 0.0, 0.0))
+            if state.state_of_tree[group_of_contact(world, contacts, i, state.group_of_tree)] != COLLIDING:
+                resting_force(world, state, contacts, i)
     for k in range(a.shape[0]):
-        state.stage_penalty[k] = state.stage_friction[k] = 0.0
-    if world.switches.contacts and not world.implicit:
-        count = state.contact_count[0]
-        if stage > 0:
-            contacts = state.stage_contacts
-            count = present_contacts(world, state, contacts)
-            contact_velocities(world.mechanism, state.body, state.v, contacts, count)
-    for i in range(count):
-        contacts.normal_force[i] = 0.0
-        store(contacts.friction_force, i, (0.0, 0.0, 0.0))
-        if state.state_of_tree[group_of_contact(world, contacts, i, state.group_of_tree)] != COLLIDING:
-            resting_force(world, state, contacts, i)
-    for k in range(a.shape[0]):
-        a[k] = applied[k] + state.stage_penalty[k] + state.stage_friction[k]
+        a[k] = applied[k] + state.penalty_force[k] + state.friction_force[k]
     if world.switches.gravity:
         gravity(world.mechanism, state.body, world.gravity, state.bias)
         add_multiple(a, -1.0, state.bias)

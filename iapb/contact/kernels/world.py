@@ -81,10 +81,7 @@ class World(NamedTuple):
     joint_damping: np.ndarray  # (d,) viscous [N s/m, N m s/rad]
     stops: Stops
     impulse_limit: np.ndarray  # (d,) largest |Jᵀp/Δt| the device can render [N, N m], inf = none
-    stage_fraction: np.ndarray  # (s,) time of each force evaluation as a fraction of the step, first 0
-    stage_weight: np.ndarray  # (s,) weight of each force evaluation, sum 1
-    semi_implicit: bool  # the new velocity moves the configuration (one stage only)
-    conserving: bool  # free motion keeps momentum (`iapb.mechanics.kernels.free_motion`); one stage only
+    conserving: bool  # free motion keeps momentum (`iapb.mechanics.kernels.free_motion`)
     free: FreeMotion
 
 
@@ -101,7 +98,7 @@ class State(NamedTuple):
     body: Workspace  # placements and mechanics scratch
     contacts: ContactBuffer  # of this step
     previous: ContactBuffer  # of the step before
-    stage_contacts: ContactBuffer  # at an inner stage of the integrator
+    scratch_contacts: ContactBuffer  # of another velocity or configuration
     contact_count: Annotated[Integers, "2"]  # contacts now, contacts in the step before
     group_of_tree: Annotated[Integers, "tree"]  # first tree of its contact group
     state_of_tree: Annotated[States, "tree"]  # FREE, COLLIDING, RESTING
@@ -111,14 +108,11 @@ class State(NamedTuple):
     penalty_force: Annotated[Floats, "velocity"]  # [N, N m]
     friction_force: Annotated[Floats, "velocity"]
     impulse: Annotated[Floats, "velocity"]  # generalized impulse of the step [N s, N m s]
-    stage_penalty: Annotated[Floats, "velocity"]  # the same at one stage of the integrator
-    stage_friction: Annotated[Floats, "velocity"]
     bias: Annotated[Floats, "velocity"]  # B or G, scratch
     acceleration: Annotated[Floats, "velocity"]
-    start_q: Annotated[Floats, "coordinate"]  # scratch of the integrators
+    scratch_q: Annotated[Floats, "coordinate"]  # another configuration
     start_v: Annotated[Floats, "velocity"]  # velocity after the impact
-    mean_v: Annotated[Floats, "velocity"]
-    mean_acceleration: Annotated[Floats, "velocity"]
+    acceleration_before: Annotated[Floats, "velocity"]  # scratch of free motion
     contact_impulse: Annotated[Floats, "row"]  # [N s] per contact, minimum norm
     rows: Annotated[Integers, "row"]  # contact of each row of the present impact
     dofs: Annotated[Integers, "velocity"]  # coordinates of the present group

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.mechanics.integrators import INTEGRATORS
+from iapb.contact.laws import INTEGRATORS, ImpulseAugmented, Penalty
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.simulation import simulate

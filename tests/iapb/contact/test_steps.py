@@ -9,7 +9,6 @@ import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.mechanics.integrators import INTEGRATORS
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
@@ -121,9 +120,7 @@ CASES: dict[str, tuple[Scene, Any]] = {
     "arm and block": (shipped("arm_pushing", duration=0.6), ImpulseAugmented()),
     "cradle": (shipped("newton_cradle", duration=0.1), ImpulseAugmented()),
     "cradle that touches": (touching_row(), ImpulseAugmented()),
-    "plane, Runge-Kutta, filters": (pit(False, cluster_distance=0.15, damping=20), Penalty("runge_kutta_4")),
-    "space, midpoint": (pit(True, damping=20), ImpulseAugmented("midpoint")),
-    "arm, Runge-Kutta": (swinging(0.0), ImpulseAugmented("runge_kutta_4")),
+    "plane, penalty and filters": (pit(False, cluster_distance=0.15, damping=20), Penalty()),
     "plane, scaled group": (held(pit(False)), ImpulseAugmented(rendering="scale")),
     "plane, spread group": (held(pit(False)), ImpulseAugmented(rendering="spread")),
     "peg, scaled": (pushed_peg(contact__restitution=0.6), ImpulseAugmented(rendering="scale")),
@@ -295,8 +292,6 @@ class Step:
                 assert np.linalg.norm(slip) <= STICKS
             elif np.linalg.norm(slip) > 20.0 * STICKS:
                 np.testing.assert_allclose(drag, -limit * slip / np.linalg.norm(slip), atol=2e-2 * limit)
-        if len(INTEGRATORS[self.law.integrator].weight) > 1:
-            return
         np.testing.assert_allclose(self.run.penalty_force[self.k], penalty, atol=1e-6)
         damped = np.zeros(self.m.nv)
         for start, body in zip(self.m.arrays.v_start, self.scene.bodies, strict=True):
@@ -311,27 +306,12 @@ class Step:
             assert self.run.friction_force[self.k] @ after <= 1e-9 or given.forces == "paper"
 
     def check_motion(self, v_plus: np.ndarray) -> None:
-        """(7): with the record's forces where the step has one stage, else with (5), (6) at the contacts of each."""
-        h, run, k, method = self.system.dt, self.run, self.k, INTEGRATORS[self.law.integrator]
-
-        def acceleration(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-            force = run.hand_force[k] + run.coupling_force[k] - self.m.gravity(q, self.system.gravity)
-            if len(method.weight) == 1:
-                force = force + run.penalty_force[k] + run.friction_force[k]
-            for c in paper.contacts_of(self.system, q) if len(method.weight) > 1 else []:
-                if self.states[self.of(self.group, c)] == COLLIDING:
-                    continue
-                J, arm = paper.relative_jacobian(self.m, q, c), np.zeros(self.m.nv)
-                if c.stop is not None:
-                    arm[c.stop[1]] = c.stop[0]
-                    given = self.scene.contact
-                    force = force + arm * max(-given.stiffness * c.gap - given.damping * (arm @ v), 0.0)
-                else:
-                    push, drag = paper.resting(self.scene, c, J, v)
-                    force = force + J.T @ (push * c.normal + drag)
-            return np.linalg.solve(self.m.mass_matrix(q), force - self.m.bias(q, v))
-
-        q, after = method.step(self.m.integrate, acceleration, self.q, v_plus, h)
+        """(7) with the record's forces, by semi-implicit Euler."""
+        h, run, k = self.system.dt, self.run, self.k
+        force = run.hand_force[k] + run.coupling_force[k] + run.penalty_force[k] + run.friction_force[k]
+        force = force - self.m.gravity(self.q, self.system.gravity) - self.m.bias(self.q, v_plus)
+        after = v_plus + h * np.linalg.solve(self.m.mass_matrix(self.q), force)
+        q = self.m.integrate(self.q, after, h)
         close = 1e-5 if self.scene.contact.forces == "implicit" else ROUNDING  # Newton's method ends at 1e-14 of energy
         np.testing.assert_allclose(run.v[k + 1], after, atol=close * max(1.0, np.abs(after).max()))
         np.testing.assert_allclose(run.q[k + 1], q, atol=h * close * max(1.0, np.abs(after).max()))
@@ -349,7 +329,7 @@ def test_every_step_is_the_papers(name: str) -> None:
         step.check_set()
         v_plus, spreading = step.check_impulses()
         step.check_forces(v_plus)
-        if not INTEGRATORS[law.integrator].conserving:
+        if law.integrator == "semi_implicit_euler":
             step.check_motion(v_plus)
         before, seen, expected = step.contacts, seen | set(step.states), step.linear
     assert COLLIDING in seen if law.impulses else RESTING in seen
