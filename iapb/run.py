@@ -154,7 +154,7 @@ class Run:
         default_factory=lambda: np.zeros(0))
     kernel: str = "compiled"  # or "python"
     stopped: str = ""  # why an incomplete run was stopped; empty for a complete one
-    remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene, such as by contact.auto
+    remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene
     # why the result is not to be trusted (`iapb.advice.distrust`); empty if nothing is wrong
     distrust: tuple[str, ...] = field(default_factory=tuple)  # no default of the class, which would hide a Later
     every: int = 1  # N: of a long run, every N-th step is recorded, and each step with an impact (`iapb.thinning`)

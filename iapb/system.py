@@ -46,7 +46,7 @@ class System:
 
     Attributes
     ----------
-    scene : Scene, with the values that `contact.auto` chooses
+    scene : Scene, with the stiffness and damping chosen for implicit contact
     remarks : sentences on the chosen values
     mechanism : Mechanism
     shapes, pairs : Shapes and their candidate pairs (k, 2); capacity : largest number of contacts

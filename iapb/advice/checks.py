@@ -6,7 +6,7 @@ b = B Δt/m. A step maps (gap, velocity) linearly. The oscillation grows if that
 1, which means k + 2 b > 4. Contacts that share a body oscillate
 together: 1/m is then the largest eigenvalue of J M⁻¹ Jᵀ over all of them. A new contact can start at a depth of up to
 v Δt, and its spring then returns up to k times the kinetic energy of the approach, so k must not exceed 1 either.
-`contact.auto` chooses values well below both limits. `iapb.advice.distrust` checks the run itself.
+`iapb.advice.distrust` checks the run itself.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
-from iapb.scene.parts import LARGEST_NUMBER, STIFFEST, written
+from iapb.scene.parts import STIFFEST, written
 from iapb.schema import Floats, Integers, zeros_of
 
 Rows = Integers  # numbers of contacts
@@ -470,33 +470,22 @@ def _down(x: float) -> float:
     return _up(x, math.floor, 1.0 + ROUNDED)
 
 
-# What `contact.auto` and `contact.forces: implicit` choose
+# What `contact.forces: implicit` chooses
 
-AUTO_K, AUTO_B = 0.2, 0.5  # k and b at the most critical contacts: k + 2 b = 1.2 is far below 4
-SPARE = 2.0  # factor by which later contacts may be lighter than those at the start
 SAG_ALLOWED, SAG_SHARE = 1e-4, 1e-3  # m, and share of the smallest shape: largest static sag of implicit contact
 SPARE_LOAD = 10.0  # times the weight of everything that moves: levers and wedges can press harder
 RELAXATION = 0.1  # s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
 STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
-_UNITS = {"stiffness": "N/m", "damping": "N s/m", "coherence_distance": "m"}
+_UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 
 
 def chosen_scene(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with the values that the toolkit chooses, unchanged if there are none, and remarks on them."""
-    said: tuple[str, ...] = ()
-    if scene.contact.auto:
-        choice, said = _chosen(Start(scene))
-        scene = scene.with_values({"contact.auto": False} | {f"contact.{name}": x for name, x in choice.items()})
-    elif scene.chosen_fields:
-        choice, said = _firm(scene)
-        contact = scene.contact.model_copy(update=choice)
-        contact._chosen = tuple(choice)
-        scene = scene.model_copy(update={"contact": contact})
-    return scene, said
+    """Return the scene with the stiffness and damping of implicit contact that it does not give, and a remark on them.
 
-
-def _firm(scene: Scene) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return stiffness and damping of implicit contact that are not given, and a sentence on them."""
+    A scene that gives both, or has the paper's forces, is unchanged, and there is no remark.
+    """
+    if not scene.chosen_fields:
+        return scene, ()
     sag = min([SAG_ALLOWED, *(SAG_SHARE * solid.thin for solid in solids_of(mechanism.shapes_of(scene)).values())])
     load = sum(body.mass for body in scene.bodies) * max(STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,))))
     load += scene.hand.largest_force(scene.duration) if scene.hand is not None else 0.0
@@ -505,39 +494,8 @@ def _firm(scene: Scene) -> tuple[dict[str, float], tuple[str, ...]]:
         choice["stiffness"] = K = min(_up(SPARE_LOAD * load / sag), STIFFEST)
     if "damping" in scene.chosen_fields:
         choice["damping"] = min(_up(K * RELAXATION), STIFFEST)
+    contact = scene.contact.model_copy(update=choice)
+    contact._chosen = tuple(choice)
+    listed = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
     sags = f"; a load of {load:.3g} N sags by {in_metres(load / K)}" if K > 0.0 else ""
-    return choice, (f"chosen for implicit contact: {_listed(choice)}{sags}",)
-
-
-def _listed(choice: dict[str, float]) -> str:
-    return ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
-
-
-def _chosen(start: Start) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the values that `contact.auto` chooses, and a remark."""
-    scene, dt, choice, said = start.scene, start.dt, dict[str, float](), tuple[str, ...]()
-    given = scene.contact.model_fields_set
-    mobility, rows = start.critical[0]
-    who = start.names(rows)
-    mobility *= SPARE if len(start.blocks) > 1 else 1.0
-    if mobility == 0.0:  # nothing is near enough to know what will touch: as if the lightest body did
-        mobility = SPARE * max((1.0 / body.mass for body in scene.bodies if body.mass > 0.0), default=0.0)
-        who = "the lightest body"
-    if mobility == 0.0 or not len(start.rows) and not len(start.pairs):
-        return {}, ()
-    if scene.contact.forces == "implicit":
-        choice, said = _firm(scene)
-        given = given | {"stiffness", "damping"}
-    if "stiffness" not in given:
-        choice["stiffness"] = _down(AUTO_K / (mobility * dt**2))
-    if "damping" not in given:
-        K = choice.get("stiffness", scene.contact.stiffness)
-        most = AUTO_B * min(1.0, math.sqrt(K * mobility * dt**2 / AUTO_K))  # softer springs want less
-        choice["damping"] = _down(most / (mobility * dt))
-    if "coherence_distance" not in given:  # twice what the fastest contact point moves in a step, after a fall or push
-        length = float(np.ptp(start.found.point, axis=0).max()) if len(start.rows) else 0.0
-        speed, push = (float(np.abs(each).max(initial=0.0)) for each in (start.rows @ start.v, start.pull))
-        choice["coherence_distance"] = _up(2.0 * math.sqrt(speed**2 + 2.0 * push * length) * dt)
-    choice = {name: min(value, LARGEST_NUMBER) for name, value in choice.items()}
-    return choice, said or (f"contact.auto chose {_listed(choice)}: effective mass {1.0 / mobility:.3g} kg at {who}, "
-                            f"{scene.rate:g} Hz",)
+    return scene.model_copy(update={"contact": contact}), (f"chosen for implicit contact: {listed}{sags}",)

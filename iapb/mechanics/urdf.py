@@ -1,10 +1,11 @@
-"""Read a URDF file into bodies and contact shapes, with the standard library's XML parser alone.
+"""Read a URDF file into bodies, with the standard library's XML parser alone.
 
 The reader is independent of Pinocchio's, so a comparison of the two also checks the reading. Order and layout of
 q and v are those of `pin.buildModelFromUrdf`: depth first, children of a link in the alphabetical order of
 their joints' names; continuous joints (cos, sin); floating joints as SE(3) with velocities in body axes; mimic joints
 independent. Only planar joints differ: they are the engine's own `planar`. Fixed joints stay as bodies without degrees
-of freedom. Source of the format: the URDF XML specification (wiki.ros.org/urdf/XML); <capsule> as in ROS 2.
+of freedom. Elements of shapes, <visual> and <collision>, are ignored. Source of the format: the URDF XML specification
+(wiki.ros.org/urdf/XML).
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 import difflib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -26,22 +27,17 @@ from iapb.schema import Floats
 
 WITH_AXIS = ("revolute", "continuous", "prismatic")
 KIND_OF_TYPE = {**{kind: kind for kind in ("fixed", *WITH_AXIS, "planar")}, "floating": "free_flyer"}
-# geometry of a <collision> -> its attributes that are lengths, and how many numbers each holds
-LENGTHS = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1},
-           "capsule": {"radius": 1, "length": 1}, "mesh": {}}
-
 # children that are read, and attributes, of the elements that have any
 _CHILDREN: dict[str, tuple[str, ...]] = {
-    "robot": ("link", "joint"), "link": ("inertial", "collision"), "joint": ("origin", "parent", "child", "axis"),
-    "inertial": ("origin", "mass", "inertia"), "collision": ("origin", "geometry"), "geometry": tuple(LENGTHS),
+    "robot": ("link", "joint"), "link": ("inertial",), "joint": ("origin", "parent", "child", "axis"),
+    "inertial": ("origin", "mass", "inertia"),
 }
 _ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "origin": ("xyz", "rpy", "quat_xyzw"), "mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
     "axis": ("xyz",), "parent": ("link",), "child": ("link",),
-    **{kind: tuple(lengths) for kind, lengths in LENGTHS.items() if lengths},
 }
-_MANY = ("link", "joint", "collision", *LENGTHS)  # an element may hold several of these
-_NEAR = 0.75  # share of letters that agree: inertail and colision are errors, contact and visual are other words
+_MANY = ("link", "joint")  # an element may hold several of these
+_NEAR = 0.75  # share of letters that agree: inertail is an error, contact and visual are other words
 MAX_BYTES = 10_000_000  # the largest known robot file has a tenth of this
 
 
@@ -117,42 +113,6 @@ def _joint(element: ElementTree.Element) -> Joint:
         if not along.any():
             raise ArgumentError(f"{where} axis", axis.get("xyz"), "a vector that is not zero")
     return Joint(KIND_OF_TYPE[kind], (float(along[0]), float(along[1]), float(along[2])))
-
-
-class CollisionShape(NamedTuple):
-    """One <collision> element of a link."""
-
-    kind: str  # box, sphere, cylinder, capsule or mesh; the scene decides which of them it accepts
-    lengths: Floats  # [m] sides of a box; radius of a sphere; radius and length of cylinder and capsule; none of a mesh
-    rotation: Floats  # (3, 3) of the shape's own axes, in link axes
-    center: Floats  # (3,) [m]
-
-
-def read_collisions(path: str | Path) -> dict[str, tuple[CollisionShape, ...]]:
-    """Return the shapes of every link, in the order of the file; links without any have an empty tuple.
-
-    Raises
-    ------
-    ArgumentError
-        The file is not a URDF robot, or a collision element is wrong; the message names link and element.
-    """
-    links = elements_by_name(parse_robot(Path(path)), "link")
-    return {name: tuple(_shape(element, f"{where_of(link)} collision") for element in link.findall("collision"))
-            for name, link in links.items()}
-
-
-def _shape(collision: ElementTree.Element, where: str) -> CollisionShape:
-    geometry = collision.find("geometry")
-    kinds = [] if geometry is None else list(geometry)
-    if len(kinds) != 1 or kinds[0].tag not in LENGTHS:
-        found = ", ".join(f"<{kind.tag}>" for kind in kinds) or "nothing"
-        raise ArgumentError(f"{where} geometry", found, one_of(found, [f"<{kind}>" for kind in LENGTHS]))
-    tag, given = kinds[0].tag, kinds[0]
-    values = [numbers_in(f"{where} {tag} {name}", given.get(name), count) for name, count in LENGTHS[tag].items()]
-    lengths = np.concatenate([np.zeros(0), *values])
-    if (lengths <= 0.0).any():
-        raise ArgumentError(f"{where} {tag}", lengths.tolist(), "lengths > 0 m")
-    return CollisionShape(tag, lengths, *origin_of(collision, where))
 
 
 class _Builder(ElementTree.TreeBuilder):

@@ -216,20 +216,16 @@ class Frictions(NamedTuple):
 def frictions_of(scene: Scene) -> Frictions:
     """Return mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow, with mu = 0.
 
-    A value of `contact.friction_pairs` comes first. Otherwise mu is the geometric mean of the two given values. If only
-    one of the two gives a value, that value counts; if neither does, `contact.friction` counts. So equal values are
-    kept to the last bit, and everything slides on a body with mu = 0.
+    It is the geometric mean of the two given values. If only one of the two gives a value, that value counts; if
+    neither does, `contact.friction` counts. So equal values are kept to the last bit, and everything slides on a body
+    with mu = 0.
     """
-    pairs = {frozenset(pair.between): pair.friction for pair in scene.contact.friction_pairs}
-    paired = frozenset().union(*pairs)
-    alike: dict[tuple[str, float | None], int] = {}
-    classes = [alike.setdefault((owner.name if owner.name in paired else "", owner.friction), len(alike))
-               for _, owner, _ in _owned_shapes(scene)]
+    alike: dict[float | None, int] = {}
+    classes = [alike.setdefault(owner.friction, len(alike)) for _, owner, _ in _owned_shapes(scene)]
     stops = _stop_count(scene)
     table = np.zeros((len(alike) + (stops > 0),) * 2)
-    for (a, first), i in alike.items():
-        for (b, second), k in alike.items():
+    for first, i in alike.items():
+        for second, k in alike.items():
             own = [mu for mu in (first, second) if mu is not None] or [scene.contact.friction]
-            mean = own[0] if own[0] == own[-1] else math.sqrt(own[0] * own[-1])
-            table[i, k] = pairs.get(frozenset({a, b}), mean)
+            table[i, k] = own[0] if own[0] == own[-1] else math.sqrt(own[0] * own[-1])
     return Frictions(np.array(classes + [len(alike)] * stops, np.int64), table)

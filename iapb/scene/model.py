@@ -45,10 +45,8 @@ MAX_WALLS = 2000
 MAX_SHAPES = 4000  # bodies and walls together; the number of candidate pairs grows with its square
 MAX_RATE = 1e6  # Hz, a thousand times the haptic rate
 MAX_STEPS = 10_000_000  # in one simulation: 2.7 hours at 1 kHz; more is a mistake
-MAX_PAIRS = 1000  # pairs with their own friction
 MAX_ROWS = 100_000  # rows of a hand's force over time
 MAX_DELAY = 1000  # steps
-AUTO = ("stiffness", "damping", "coherence_distance")  # contact fields that `auto` chooses if they are not given
 Mistakes = Iterator[tuple[Path, Any, str]]
 PerCoordinate = tuple[NonNegative, ...]
 Gravity = Annotated[V | None, Field(description="acceleration [m/s2], world axes; default: none")]
@@ -57,18 +55,9 @@ Bodies = Annotated[tuple[V, ...], Field(min_length=1, max_length=MAX_BODIES,
 Walls = Annotated[tuple[V, ...], Field(max_length=MAX_WALLS, description="the static world")]
 
 
-class FrictionPair(ScenePart):
-    """The friction of one pair of things; it replaces the values that each of them gives."""
-
-    between: tuple[Name, Name] = Field(description="names of two bodies, or of a body and a wall")
-    friction: NonNegative = Field(description="coefficient mu [1] where these two touch")
-
-
 class Contact(ScenePart):
     """How contacts behave. The defaults are the paper's values; where it gives none, they are this project's."""
 
-    auto: Truth = Field(False, description="true: stiffness, damping and coherence_distance are chosen from masses, "
-        "sizes, gravity and rate where they are not given; contact: auto is short for it; default false")
     forces: Literal["implicit", "paper"] = Field("implicit", description="implicit (default): resting forces that no "
         "stiffness or step makes unstable, Coulomb's friction, also in impacts, stiffness and damping chosen for a sag "
         "below 0.1 mm; paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; contact: paper is "
@@ -78,8 +67,6 @@ class Contact(ScenePart):
     penalty: Literal["clamped", "printed"] = Field("clamped", description="clamped (default): never pulls; printed: "
         "(5) to the letter, may pull")
     friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")
-    friction_pairs: Annotated[tuple[FrictionPair, ...], Field(max_length=MAX_PAIRS)] = Field(
-        (), description="coefficients of single pairs; they come before what bodies and walls give; default: none")
     friction_velocity: Positive = Field(1e-3, description="v_threshold of (6) [m/s], with forces: paper: below it "
         "friction grows linearly; default 1e-3, ours")
     restitution: Fraction = Field(0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0")
@@ -102,9 +89,12 @@ class Contact(ScenePart):
         return self._chosen
 
 
-_WORDS: dict[Any, Any] = {"auto": {"auto": True}, "paper": {"forces": "paper"}}
-_SHORT = BeforeValidator(lambda given: _WORDS.get(given, given) if isinstance(given, str) else given,
-                         json_schema_input_type=Literal["auto", "paper"] | Contact)
+def _spelled_out(given: Any) -> Any:
+    """Return the fields that the word `paper` is short for; anything else as it is given."""
+    return {"forces": "paper"} if given == "paper" else given
+
+
+_SHORT = BeforeValidator(_spelled_out, json_schema_input_type=Literal["paper"] | Contact)
 
 
 class Hand(ScenePart):
@@ -267,13 +257,13 @@ class Scene(ScenePart):
     @property
     def largest_friction(self) -> float:
         """The largest coefficient of friction [1] that the scene gives anywhere."""
-        parts = (self.contact, *self.contact.friction_pairs, *self.bodies, *self.walls)
+        parts = (self.contact, *self.bodies, *self.walls)
         return max(part.friction for part in parts if part.friction is not None)
 
     @property
     def chosen_fields(self) -> tuple[str, ...]:
         """Contact fields that the toolkit chooses, since the scene gives no value for them."""
-        fields = AUTO if self.contact.auto else () if self.contact.forces == "paper" else ("stiffness", "damping")
+        fields = () if self.contact.forces == "paper" else ("stiffness", "damping")
         return tuple(name for name in fields if name not in self.contact.model_fields_set)
 
     @property
@@ -368,7 +358,6 @@ def _across_parts(given: Any) -> Mistakes:
     count = len(walls) + sum(len(_mappings(body, "shapes")) for body in bodies)
     if count > MAX_SHAPES:
         yield ("bodies",), f"{count} shapes", f"at most {MAX_SHAPES} shapes, walls included"
-    yield from _friction_pairs(given, {*names, *(_text(wall, "name") for wall in walls)})
     yield from _tool(given, bodies, names, roots)
 
 
@@ -390,23 +379,6 @@ def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
         name, parent = _text(body, "name"), _text(body, "parent", WORLD)
         root.setdefault(name, name if parent == WORLD else root.get(parent))
     return [root[_text(body, "name")] for body in bodies]
-
-
-def _friction_pairs(given: Any, names: set[str | None]) -> Mistakes:
-    """Check that friction pairs name things of the scene, and that no pair occurs twice."""
-    seen: set[frozenset[str]] = set()
-    for i, pair in enumerate(_mappings(given.get("contact"), "friction_pairs")):
-        between, where = pair.get("between"), ("contact", "friction_pairs", i, "between")
-        if not isinstance(between, list | tuple) or not all(isinstance(name, str) for name in between):
-            continue
-        for k, name in enumerate(between):
-            if name not in names and None not in names:
-                yield (*where, k), name, "the name of a body or a wall of this scene"
-        if len(between) == 2 and between[0] == between[1]:
-            yield where, list(between), "two different things"
-        if frozenset(between) in seen:
-            yield where, list(between), "two things that no earlier pair names"
-        seen.add(frozenset(between))
 
 
 def _tool(given: Any, bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]) -> Mistakes:

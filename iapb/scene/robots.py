@@ -4,9 +4,7 @@
       - {name: arm, urdf: robots/six_axis_arm.urdf, shapes: {forearm: [{kind: sphere, radius: 0.05}]},
          position: {upper_arm: [0.3]}}
 
-By default no link can touch anything. `shapes` gives shapes link by link; ``collisions: urdf`` takes the boxes and
-spheres of the file's <collision> elements. `shapes` of a link replace those of the file. A scene has no cylinders,
-capsules or meshes, so a link with one of them needs boxes and spheres, or ``[]``, under `shapes`.
+By default no link can touch anything. `shapes` gives shapes link by link; <collision> elements of the file are ignored.
 
 Each link becomes the body ``<robot>_<link>``, with ``_`` for dots and blanks. After reading, the scene has the bodies
 themselves, so its text and its runs do not need the URDF file. Paths are relative to the scene file and must stay in
@@ -17,7 +15,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -29,7 +27,6 @@ from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
 from iapb.scene.document import Document
 from iapb.scene.parts import Name, Number, ScenePart, Text, Truth, Vector3, mistakes_of
 
-HELD = ("box", "sphere")  # URDF geometries that the compiled narrow phase supports
 MAX_ROBOTS = 100  # in one scene; each one is a file to read
 
 
@@ -41,8 +38,6 @@ class Robot(ScenePart):
     origin: Vector3 = Field(ORIGIN, description="where its root link lies [m], world axes")
     rpy: Vector3 = Field(ORIGIN, description="how its root link is turned: roll, pitch, yaw [rad]")
     floating: Truth = Field(False, description="true: the root link moves freely; default: fixed to the world")
-    collisions: Literal["none", "urdf"] = Field("none", description="urdf: boxes and spheres of the file's "
-        "<collision> elements can touch, where shapes says nothing about the link; none: shapes alone")
     shapes: dict[str, tuple[SpatialShape, ...]] = Field(default_factory=dict, description="what can touch, by link; "
         "link axes; [] for nothing")
     position: dict[str, tuple[Number, ...]] = Field(default_factory=dict, description="coordinates at the start of "
@@ -80,12 +75,11 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
     Raises
     ------
     ArgumentError
-        The path leads out of the folder, the file is not a URDF robot, a named link does not exist, or the
-        <collision> of a link is neither box nor sphere.
+        The path leads out of the folder, the file is not a URDF robot, or a named link does not exist.
     """
     from iapb.linalg import product  # brings numba along
     from iapb.mechanics.rotations import angles_of, rotation_of
-    from iapb.mechanics.urdf import read_collisions, read_urdf
+    from iapb.mechanics.urdf import read_urdf
 
     path, root = Path(robot.urdf), folder.resolve()
     leads_out = "\0" in robot.urdf or path.is_absolute() or ".." in path.parts
@@ -97,16 +91,6 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
         for name in getattr(robot, field):
             if name not in names:
                 raise ArgumentError(f"{field} of robot {robot.name}", name, one_of(name, names, "a link of it: "))
-    shapes: dict[str, Any] = {link: [shape.model_dump(mode="json") for shape in given]
-                              for link, given in robot.shapes.items()}
-    if robot.collisions == "urdf":
-        read = {link: given for link, given in read_collisions(root / path).items() if link not in shapes}
-        foreign = {f"{link} <{shape.kind}>": 0 for link, given in read.items() for shape in given
-                   if shape.kind not in HELD}
-        if foreign:
-            expected = "links with boxes and spheres; give the others boxes and spheres, or [], under shapes"
-            raise ArgumentError("collisions", ", ".join(foreign), expected)
-        shapes |= {link: [_plain_shape(shape) for shape in given] for link, given in read.items()}
     bodies = []
     for link in links:
         rotation, origin = link.placement
@@ -124,20 +108,11 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
             "center_of_mass": link.center_of_mass.tolist(),
             "mass": link.mass,
             "inertia": link.inertia.tolist(),
-            "shapes": shapes.get(link.name, []),
+            "shapes": [shape.model_dump(mode="json") for shape in robot.shapes.get(link.name, ())],
             "position": list(robot.position.get(link.name, kind.neutral)),
             "velocity": list(robot.velocity.get(link.name, ())),
         })
     return bodies
-
-
-def _plain_shape(shape: Any) -> dict[str, Any]:
-    from iapb.mechanics.rotations import angles_of  # brings numba along
-
-    plain = {"kind": shape.kind, "center": shape.center.tolist()}
-    if shape.kind == "sphere":
-        return plain | {"radius": float(shape.lengths[0])}
-    return plain | {"size": shape.lengths.tolist(), "rpy": list(angles_of(shape.rotation))}
 
 
 def _body_name(robot: Robot, link: str) -> str:

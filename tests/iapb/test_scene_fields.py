@@ -24,16 +24,15 @@ PEG = load_scene(find_scene("peg_corner"))
 # Friction
 
 
-@pytest.mark.parametrize(("peg", "floor", "general", "named", "expected"), [
-    (0.5, 0.5, 0.0, None, 0.5), (0.2, 0.8, 0.3, None, 0.4), (0.25, None, 0.7, None, 0.25),
-    (None, 0.25, 0.7, None, 0.25), (0.0, 0.9, 0.5, None, 0.0), (None, None, 0.3, None, 0.3), (0.9, 0.9, 0.5, 0.0, 0.0),
+@pytest.mark.parametrize(("peg", "floor", "general", "expected"), [
+    (0.5, 0.5, 0.0, 0.5), (0.2, 0.8, 0.3, 0.4), (0.25, None, 0.7, 0.25),
+    (None, 0.25, 0.7, 0.25), (0.0, 0.9, 0.5, 0.0), (None, None, 0.3, 0.3),
 ])
-def test_of_two_values_the_geometric_mean_counts_and_a_named_pair_comes_first(
-    peg: float | None, floor: float | None, general: float, named: float | None, expected: float
+def test_of_two_values_the_geometric_mean_counts(
+    peg: float | None, floor: float | None, general: float, expected: float
 ) -> None:
     scene = PEG.with_values({
-        "bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general,
-        "contact.friction_pairs": [] if named is None else [{"between": ["floor", "peg"], "friction": named}]})
+        "bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general})
     found = frictions_of(scene).by_pair(pairs_of(scene, shapes_of(scene)))  # right wall, floor
     assert found == pytest.approx([general if peg is None else peg, expected], rel=1e-15)
 

@@ -25,7 +25,7 @@ from hypothesis import strategies as st
 
 from iapb import decide_effects, load_scene, simulate
 from iapb.errors import IapbError, RunFileError
-from iapb.mechanics.urdf import read_collisions, read_urdf
+from iapb.mechanics.urdf import read_urdf
 from iapb.scene import scene_folder
 from iapb.scene.document import Document
 from reference.datasets import read_problem
@@ -209,7 +209,6 @@ def read_study(path):
 
 def read_robot(path):
     read_urdf(path)
-    read_collisions(path)
 
 
 def read_results(path):

@@ -6,12 +6,11 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from iapb.advice.checks import Start, check_scene, chosen_scene, step_limits
 from iapb.contact.laws import ImpulseAugmented
-from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_from_text, scene_names
+from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_names
 from iapb.simulation import simulate
 
 FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
@@ -174,34 +173,11 @@ walls:
     assert {one.where for one in check_scene(SpatialScene.model_validate(spatial))} == {"bodies[0].rpy[1]"}
 
 
-# contact: auto
-
-
-def test_auto_chooses_what_the_step_holds_and_what_is_given_stays() -> None:
-    """Stiffness and damping are 0.2 and 0.5 of m/3 and steps, with two digits."""
-    made = scene(box(height=0.15), auto=True)
-    chosen, (said,) = chosen_scene(made)
-    assert chosen.contact.stiffness == 66000.0 and chosen.contact.damping == 160.0
-    assert "stiffness = 66000 N/m" in said and not check_scene(chosen)
-    given, (said,) = chosen_scene(scene(box(height=0.15), auto=True, stiffness=2000, friction=0.3))
-    assert given.contact.stiffness == 2000.0 and given.contact.friction == 0.3 and "stiffness" not in said
-    heavier = made.with_values({"bodies.box_0.mass": 2.0, "bodies.box_0.inertia": MASS * SIDE**2 / 3.0})
-    assert chosen_scene(heavier)[0].contact.stiffness == pytest.approx(2 * 66000.0, rel=0.02)
-    again = scene_from_text(chosen.source_text)
-    assert again == chosen and chosen_scene(again) == (again, ())
-
-
-def test_auto_carries_a_stack_and_the_run_says_what_was_chosen() -> None:
-    made = stack(5, duration=0.3, auto=True)
-    run = simulate(made)
-    K = run.scene_resolved["contact"]["stiffness"]
-    assert K == chosen_scene(made)[0].contact.stiffness and not run.distrust and "contact.auto chose" in run.remarks[0]
-    sag = 15.0 * MASS * 9.81 / (2.0 * K)  # of the top box: 5 + 4 + 3 + 2 + 1
-    assert np.abs(run.q[-1] - run.q[0]).max() < 1.2 * sag
+# What implicit contact chooses
 
 
 @pytest.mark.parametrize(("contact", "stiffness", "damping"), [
-    ({}, 990000.0, 99000.0), ({"stiffness": 2e4}, 2e4, 2000.0), ({"auto": True}, 990000.0, 99000.0)])
+    ({}, 990000.0, 99000.0), ({"stiffness": 2e4}, 2e4, 2000.0)])
 def test_implicit_contact_holds_ten_times_all_weight_at_a_tenth_of_a_millimetre(
         contact: dict[str, Any], stiffness: float, damping: float) -> None:
     """10 m g over 0.1 mm, rounded up to two digits; an overlap fades in 0.1 s."""

@@ -1,4 +1,4 @@
-"""Reading URDF: what the specification says, collisions, and errors that name the element."""
+"""Reading URDF: what the specification says, and errors that name the element."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from iapb.errors import ArgumentError, SceneError
+from iapb.errors import ArgumentError
 from iapb.mechanics.mechanism import Mechanism
-from iapb.mechanics.urdf import read_collisions, read_urdf
+from iapb.mechanics.urdf import read_urdf
 from iapb.scene import load_scene, scene_folder, scene_from_text
 from iapb.simulation import simulate
 
@@ -111,17 +111,17 @@ def test_what_others_add_is_let_through(read):
     assert len(read(*added).names) == 1
 
 
-@pytest.mark.parametrize("tag", ["link", "joint", "inertial", "collision", "origin", "mass", "inertia", "axis",
-                                 "parent", "child", "geometry"])  # fmt: skip
+@pytest.mark.parametrize("tag", ["link", "joint", "inertial", "origin", "mass", "inertia", "axis", "parent",
+                                 "child"])  # fmt: skip
 def test_no_element_can_be_misspelt(tag, tmp_path):
-    """One letter lost, anywhere in a shipped file; alike for the two readers of it."""
+    """One letter lost, anywhere in a shipped file."""
     text, wrong = (scene_folder() / "robots" / "seven_axis_arm.urdf").read_text(), tag[:-2] + tag[-1]
+    text = re.sub("<collision>.*?</collision>", "", text, flags=re.DOTALL)
     for found in re.finditer(rf"<{tag}\b", text):
         path = tmp_path / "robot.urdf"
         path.write_text(text[: found.start()] + re.sub(rf"(</?){tag}\b", rf"\1{wrong}", text[found.start() :]))
         with pytest.raises(ArgumentError):
             read_urdf(path)
-            read_collisions(path)
 
 
 @pytest.mark.parametrize(("text", "named"), [
@@ -156,67 +156,24 @@ contact: {{stiffness: 1e4, damping: 20, restitution: 0, friction: 0, friction_ve
 """
 
 
-def collision(geometry: str, origin: str = "") -> str:
-    return f"<collision>{origin}<geometry>{geometry}</geometry></collision>"
-
-
-BALL = collision('<sphere radius="0.05"/>', '<origin xyz="0.4 0 0"/>')
-BAR = collision('<box size="0.4 0.02 0.04"/>', '<origin xyz="0.2 0 0" rpy="0.1 0.2 0.3"/>')
-
-
-def write(folder: Path, arm: str, base: str = "", lines: str = "collisions: urdf") -> Path:
-    (folder / "r.urdf").write_text(ARM_WITH_SHAPES.format(arm=arm, base=base))
+def write(folder: Path, arm: str = "", lines: str = "floating: false") -> Path:
+    (folder / "r.urdf").write_text(ARM_WITH_SHAPES.format(arm=arm, base=""))
     (folder / "scene.yaml").write_text(SCENE.format(lines=lines))
     return folder / "scene.yaml"
 
 
-def test_shapes_are_read_in_link_axes_and_in_the_order_of_the_file(tmp_path: Path) -> None:
-    write(tmp_path, BALL + BAR + collision('<cylinder radius="0.1" length="2"/>') + collision('<mesh filename="m"/>'))
-    read = read_collisions(tmp_path / "r.urdf")
-    assert read["base"] == () and [shape.kind for shape in read["arm"]] == ["sphere", "box", "cylinder", "mesh"]
-    assert read["arm"][0].center == pytest.approx([0.4, 0.0, 0.0])
-    assert read["arm"][1].lengths == pytest.approx([0.4, 0.02, 0.04])
-    turn = Rotation.from_euler("xyz", [0.1, 0.2, 0.3]).as_matrix()
-    assert read["arm"][1].rotation == pytest.approx(turn)
-    assert read["arm"][2].lengths == pytest.approx([0.1, 2.0])
-
-
-@pytest.mark.parametrize(("element", "said"), [
-    ("<collision/>", "geometry.*nothing"), (collision("<cone/>"), "<cone>.*one of <box>"),
-    (collision('<sphere radius="1"/><sphere radius="1"/>'), "<sphere>, <sphere>"),
-    (collision('<sphere radius="-1"/>'), "lengths > 0"), (collision('<sphere radius="nan"/>'), "sphere radius.*finite"),
-    (collision('<box size="1 2"/>'), "box size.*3 finite numbers"),
-    (collision("<capsule radius='1'/>"), "capsule length"),
-])
-def test_wrong_elements_are_named_with_their_link(tmp_path: Path, element: str, said: str) -> None:
-    write(tmp_path, element)
-    with pytest.raises(ArgumentError, match=f"(?s)link name='arm'.*{said}"):
-        read_collisions(tmp_path / "r.urdf")
-
-
-def test_a_scene_takes_them_where_it_says_so_and_keeps_them_in_its_text(tmp_path: Path) -> None:
-    scene = load_scene(write(tmp_path, BALL + BAR))
-    assert [shape.kind for shape in scene.bodies[1].shapes] == ["sphere", "box"]
-    assert scene.bodies[1].shapes[1].rpy == pytest.approx((0.1, 0.2, 0.3))
+def test_collision_elements_are_ignored_and_the_scene_gives_the_shapes(tmp_path: Path) -> None:
+    elements = '<collision><geometry><sphere radius="0.05"/></geometry></collision><collision><cone/></collision>'
+    assert load_scene(write(tmp_path, elements)).bodies[1].shapes == ()
+    scene = load_scene(write(tmp_path, elements, "shapes: {arm: [{kind: sphere, radius: 0.1}]}"))
+    assert [[shape.kind for shape in body.shapes] for body in scene.bodies] == [[], ["sphere"]]
     assert scene_from_text(scene.source_text).resolved() == scene.resolved()
-    assert load_scene(write(tmp_path, BALL, lines="floating: false")).bodies[1].shapes == ()
 
 
 def test_the_ball_at_the_end_of_the_arm_meets_the_floor(tmp_path: Path) -> None:
-    """It falls from 0.3 m until sin(angle) = 0.25/0.4; without its collision element it swings through."""
+    """It falls from 0.3 m until sin(angle) = 0.25/0.4; without its ball it swings through."""
     angle = np.arcsin(0.25 / 0.4)
-    run = simulate(load_scene(write(tmp_path, BALL)), steps=900)
+    ball = "shapes: {arm: [{kind: sphere, radius: 0.05, center: [0.4, 0, 0]}]}"
+    run = simulate(load_scene(write(tmp_path, lines=ball)), steps=900)
     assert run.q[-1, 0] == pytest.approx(angle, abs=1e-2)
-    assert simulate(load_scene(write(tmp_path, "")), steps=900).q[:, 0].max() > 1.5
-
-
-def test_what_the_scene_cannot_hold_is_a_mistake_with_its_place_until_shapes_replace_it(tmp_path: Path) -> None:
-    file = write(tmp_path, collision('<cylinder radius="0.1" length="2"/>'), collision('<mesh filename="m.stl"/>'))
-    with pytest.raises(SceneError) as caught:
-        load_scene(file)
-    (mistake,) = (found for found in caught.value.mistakes if found.path.startswith("robots"))
-    assert (mistake.line, mistake.column) == (9, 17) and mistake.path == "robots[0].collisions"
-    assert "base <mesh>, arm <cylinder>" in mistake.value and "under shapes" in mistake.expected
-    lines = "collisions: urdf\n    shapes: {base: [], arm: [{kind: sphere, radius: 0.1}]}"
-    file.write_text(SCENE.format(lines=lines))
-    assert [len(body.shapes) for body in load_scene(file).bodies] == [0, 1]
+    assert simulate(load_scene(write(tmp_path)), steps=900).q[:, 0].max() > 1.5

@@ -56,7 +56,6 @@ OWN = [value for value in NEGATIVE if value is not None]  # None: not given
 NOT_A_VECTOR = [1.0, "x", None, [1.0], [1.0, 2.0, 3.0, 4.0], ["x", 0], [math.nan, 0.0]]
 NOT_A_NAME = ["", "a b", "a.b", "1a", "é", "a\n", 3, None, "x" * 65]
 NOT_A_PAIR_OF_GAINS = [[1], [1, 1, 1], [-1, 1], [1, "x"], 3, []]
-PAIR = {"between": ["arm", "puck"], "friction": 0.1}
 
 # path: values that are refused there; the mistake names the field
 IN_THE_PLANE: dict[str, list[Any]] = {
@@ -95,9 +94,6 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "contact.stiffness": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
     "contact.damping": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
     "contact.penalty": ["soft", None, True],
-    "contact.friction_pairs": [1, [1], [PAIR | {"between": ["arm", "nobody"]}], [PAIR | {"between": ["arm"]}],
-                               [PAIR | {"friction": -1}], [PAIR, PAIR | {"between": ["puck", "arm"]}],
-                               [PAIR | {"between": ["arm", "arm"]}]],
     "contact.restitution": [*NEGATIVE, 1.001],
     "contact.self_collision_rows": ["both", None],
     "hand.body": [*NOT_A_NAME, "nobody", "floor", "foot"],
@@ -121,7 +117,7 @@ IN_THE_PLANE: dict[str, list[Any]] = {
         (NOT_A_PAIR_OF_GAINS, "device.position_resolution device.damping couplings.four_channel.stiffness "
                               "couplings.four_channel.damping couplings.unilateral.stiffness "
                               "couplings.unilateral.damping"),
-        ([1, "true", None], "contact.auto contact.self_collisions"),
+        ([1, "true", None], "contact.self_collisions"),
         ([3, None, "x" * 2001], "title source"),
         ([*NOT_A_VECTOR, [0.0, 0.0]], "bodies.slide.axis bodies.arm.center_of_mass walls.floor.normal"),
     ) for path in paths.split()},

@@ -88,7 +88,7 @@ def test_a_scene_in_space_names_its_dimensions_and_robots_alone_make_one() -> No
     scene = plain("peg_hole_space")
     assert not fits({name: value for name, value in scene.items() if name != "dimensions"}, SCHEMA)
     robots = {name: value for name, value in plain("arm_obstacles").items() if name != "bodies"}
-    assert fits(robots, SCHEMA) and fits(robots | {"contact": "auto"}, SCHEMA)
+    assert fits(robots, SCHEMA) and fits(robots | {"contact": "paper"}, SCHEMA)
     assert not fits(robots | {"robots": [{"urdf": "arm.urdf"}]}, SCHEMA)  # a robot without a name
 
 
