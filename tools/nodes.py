@@ -1,6 +1,6 @@
-"""Size of the project: nodes of the syntax tree per package, against the budget in pyproject.toml.
+"""Size of the project: nodes of the syntax tree per package, against their budget.
 
-Nodes are statements and expressions. Docstrings' words, comments and line breaks cost nothing, so a clear layout is free.
+Nodes are statements and expressions. Words of docstrings, comments and line breaks cost nothing.
 """
 
 from __future__ import annotations
